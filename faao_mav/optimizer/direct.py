@@ -11,7 +11,7 @@ Measured (benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from t
 starts, and several times quicker.
 """
 
-import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,17 +32,17 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.slot_rate import BestRate, FixedRate, unturned
+from faao_mav.optimizer.rates.slot_rate import FixedRate, unturned
 from faao_mav.optimizer.rates.table_rate import TableRate
-from faao_mav.optimizer.search.multistart import ImprovedStarts, improve_starts, stretched
+from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
-LONG_SEARCH = 6
-"""By how many times `optimizer.max_iterations` may be exceeded where there is a least speed, or a
-queue has a buffer or shares. Random plans for planes need up to 250 steps."""
+_LONG_SEARCH = 6
+"""By how many times `optimizer.max_iterations` may be exceeded. Chosen: half-duplex plans with a
+buffer need up to 300 steps."""
 
 _EXACT_ITERATIONS = 12
 """Iterations at exact rates, after those in a table, at most. Chosen. Measured with QPSK on 2, 3
@@ -53,18 +53,6 @@ ROUGH = 1e-3
 
 Chosen; what a change costs is not measured.
 """
-
-CUTOFF = "cutoff"
-"""The name of the start that a plan for the mutual information has beside `optimizer.starts`: the
-flight of the plan for the cutoff rate."""
-
-_EQUAL = 1e-6
-"""The difference in bit/s/Hz below which two optima count as equal: which of them is larger is then
-up to the tolerance and to rounding, so that it differs from machine to machine. Chosen."""
-
-
-KNOWN = "known"
-"""The name of the start that is the flight of a similar plan."""
 
 
 def direct(
@@ -81,17 +69,10 @@ def direct(
     The result is never worse than any start. Raises `InfeasibleError` when there is no flight at
     all.
     """
-    options, kin = problem.plan.optimizer, problem.kinematics
+    options, kin, relay = problem.plan.optimizer, problem.kinematics, problem.maximised_queue
     scheme = design(problem.plan)
     counts_cutoff = options.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
-    relay = problem.maximised_queue
-    # these take more steps, as shares and a buffer do
-    slow, shared = kin.min_speed > 0, relay is not None and relay.half
-    fenced_in = problem.fence is not None
-    long = shared or (relay is not None and math.isfinite(relay.buffer))
-    long = long or slow or fenced_in or problem.energy < math.inf
-    steps = options.max_iterations * (LONG_SEARCH if long else 1)
 
     def tell(number: int, stage: str, best: float) -> None:
         if observe is not None:
@@ -99,26 +80,12 @@ def direct(
 
     tell(0, "rates over the map", 0.0)
     field = rate_field(problem, scheme)
-    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
-    kept, fenced = problem.constraints(kin), problem.fenced(kin)
-    names = ("straight",) if alone else by_name(options.starts)
-    routes = (
-        starts_inside(kin, names, stations, problem.free_area, fenced)
-        if problem.free_area
-        else starts(kin, names, stations)
-    )
-    if before is not None:
-        routes[CUTOFF] = before.trajectory
-    if known is not None:
-        calm = (*constraints_of(kin), *fenced)
-        near = feasible(kin, next(iter(routes.values())), stretched(kin, known), calm)
-        routes = {KNOWN: near} if alone else routes | {KNOWN: near}
-    if problem.energy < math.inf:
-        routes = sparing_starts(kin, routes, (*constraints_of(kin), *kept))
-        if not routes:
-            raise InfeasibleError("no flight was found that takes so little energy")
+    routes = _routes(problem, before, known, alone=alone)
     tell(1, "the starts", 0.0)
-    if len(routes) > 1:
+    rough, strategy = ImprovedStarts(routes, list(routes)), None
+    steps = options.max_iterations * _LONG_SEARCH
+    if len(routes) > 1:  # a single start needs no comparison
+        strategy = WARM_START
         rough = improve_starts(
             kin,
             field,
@@ -127,55 +94,87 @@ def direct(
             max_iterations=steps,
             relay=relay,
             constraints=problem.constraints,
-            coarse=problem.energy == math.inf,  # the copy cannot make the circles that save energy
+            coarse=problem.energy == np.inf,  # the copy cannot make the circles that save energy
         )
-    else:  # a single start needs no comparison
-        rough = ImprovedStarts(routes, list(routes))
     flights = [*routes.values(), *rough.flights.values()]
-    rates = field.value(np.stack([flight.w.T for flight in flights], axis=1))
-    values = objectives(rates, kin, relay)
-    if scheme.gaussian:
-        rates = np.stack([_rates(scheme, field, flight.w) for flight in flights], axis=1)
-    reported = objectives(rates, kin, relay).tolist() if scheme.gaussian else values.tolist()
-    history = np.maximum.accumulate([reported[0], *reported[len(routes) :]]).tolist()
-    tell(2, "the best start", history[-1])
-
-    def optimized(flights: list[Trajectory]) -> list[LocalOptimum]:
-        cold = any(flight in routes.values() for flight in flights)
-        return maximize_all(
-            kin,
-            field,
-            flights,
-            constraints=kept,
-            tolerance=options.tolerance,
-            max_iterations=steps,
-            strategy=None if cold else WARM_START,
-            relay=relay,
-        )
-
-    optima = optimized([rough.flights[name] for name in rough.promising])
-    by_start = dict(zip(routes, reported[len(routes) :], strict=True))
+    values = objectives(field.value(_positions(flights)), kin, relay)
+    going = [rough.flights[name] for name in rough.promising]
+    if (first := int(values.argmax())) < len(routes):  # no start was improved as far
+        going.append(flights[first])
+    if scheme.gaussian:  # what is reported are the rates of the alphabet
+        values = np.array([_worth(problem, f.w, _designed(problem, scheme, f.w)) for f in flights])
+    tell(2, "the best start", float(values.max()))
+    optima = maximize_all(
+        kin,
+        field,
+        going,
+        constraints=problem.constraints(kin),
+        tolerance=options.tolerance,
+        max_iterations=steps,
+        strategy=strategy,
+        relay=relay,
+    )
+    by_start = dict(zip(routes, values[len(routes) :].tolist(), strict=True))
     if not scheme.gaussian:
-        by_start |= {name: end.value for name, end in zip(rough.promising, optima, strict=True)}
-    if values.max() > max(optimum.value for optimum in optima):
-        optima += optimized([flights[int(values.argmax())]])
-    best, held = _at_exact_rates(problem, scheme, field, _best(problem, field, optima))
-    solution = _solution(problem, scheme, field, best, history, by_start, held)
-    if before is None:
-        return solution
-    return replace(solution, gain=float(solution.history[-1]) - _worth(problem, before))
+        promising = zip(rough.promising, optima, strict=False)
+        by_start |= {name: optimum.value for name, optimum in promising}
+    best = _best(problem, field, optima)
+    flight, precoders, error = _at_exact_rates(problem, scheme, field, best)
+    residual = f"stationary to {best.residual:.1e}"
+    solution = make_solution(
+        problem,
+        flight,
+        _pair([link.small_scale(flight.w) for link in problem.links]),
+        _pair(precoders),
+        [],
+        converged=best.converged,
+        ending=residual if best.converged else f"stopped after {best.iterations} steps, {residual}",
+    )
+    reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
+    history = np.maximum.accumulate([values[0], *values[len(routes) :]]) - error
+    return replace(
+        solution,
+        history=np.append(history, reached),
+        starts={name: value - error for name, value in by_start.items()},
+        gain=None
+        if before is None
+        else reached - _worth(problem, before.w, [before.P_B, before.P_U]),
+    )
 
 
-def _worth(problem: Problem, other: Solution) -> float:
-    """Return what `problem` maximises, bit/s/Hz, of the flight and the precoders of `other`."""
-    rates = [
-        link.rates(other.w, H_r, P)
-        for link, H_r, P in zip(
-            problem.links, (other.H_rB, other.H_rU), (other.P_B, other.P_U), strict=True
-        )
-    ]
-    values = objectives(np.stack(rates)[:, None], problem.kinematics, problem.maximised_queue)
-    return float(values[0])
+def _routes(
+    problem: Problem, before: Solution | None, known: Trajectory | None, *, alone: bool
+) -> dict[str, Trajectory]:
+    """Return the flights from which the search starts, by name.
+
+    They are those of `optimizer.starts`, `cutoff`, that of the plan for the cutoff rate `before`,
+    and `known`, that of a similar plan, or this `alone`.
+    """
+    kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
+    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    names = ("straight",) if alone else by_name(problem.plan.optimizer.starts)
+    routes = (
+        starts_inside(kin, names, stations, problem.free_area, fenced)
+        if problem.free_area
+        else starts(kin, names, stations)
+    )
+    if before is not None:
+        routes["cutoff"] = before.trajectory
+    if known is not None:
+        calm = (*constraints_of(kin), *fenced)
+        near = feasible(kin, next(iter(routes.values())), stretched(kin, known), calm)
+        routes = {"known": near} if alone else routes | {"known": near}
+    if problem.energy < np.inf:
+        kept = problem.constraints(kin)
+        routes = sparing_starts(kin, routes, (*constraints_of(kin), *kept))
+        if not routes:
+            raise InfeasibleError("no flight was found that takes so little energy")
+    return routes
+
+
+def _positions(flights: Sequence[Trajectory]) -> Real:
+    """Return the positions of the `flights`, (2, flights, n)."""
+    return np.stack([flight.w.T for flight in flights], axis=1)
 
 
 def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> LocalOptimum:
@@ -184,126 +183,88 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
     A route and its mirror image have the same R_avg, and may deliver very different amounts.
     """
     most = max(optimum.value for optimum in optima)
-    equal = [optimum for optimum in optima if optimum.value > most - _EQUAL]
-    if len(equal) == 1:
-        return equal[0]
-    rates = field.value(np.stack([optimum.trajectory.w.T for optimum in equal], axis=1))
+    equal = [optimum for optimum in optima if optimum.value > most - EQUAL]
+    rates = field.value(_positions([optimum.trajectory for optimum in equal]))
     delivered = objectives(rates, problem.kinematics, problem.relay)
-    return equal[int(np.argmax(np.round(delivered / _EQUAL)))]
+    return equal[int(np.argmax(np.round(delivered / EQUAL)))]
 
 
 def _at_exact_rates(
     problem: Problem, scheme: Design, field: RateField, optimum: LocalOptimum
-) -> tuple[LocalOptimum, list[Complex]]:
-    """Return `optimum`, taken a little further where it was found in an approximate table.
+) -> tuple[Trajectory, list[Complex], float]:
+    """Return the flight of `optimum`, its precoders, and by how much its value is too large.
 
-    With the precoders held, the rates are exact, and whatever they gain the best ones gain too. The
-    precoders are returned with it, none where the table is exact.
+    Where searched precoders were interpolated in a table of modes, the flight is taken a little
+    further with precoders that are held: the rates are then exact, and whatever they gain the best
+    ones gain too.
     """
-    approximate = any(
-        isinstance(rate, TableRate) and rate.kind == "modes" and not rate.exact
-        for rate in field.rates
-    )
-    if problem.plan.optimizer.rate != "cutoff" or not approximate:
-        return optimum, []
-    w, kin = optimum.trajectory.w, problem.kinematics
-    held = [
-        _precoders(link, rate, scheme, w, link.channel(w, link.small_scale(w)))
+    flight, kin = optimum.trajectory, problem.kinematics
+    precoders = [
+        _precoders(link, rate, scheme, flight.w)
         for link, rate in zip(field.links, field.rates, strict=True)
     ]
-    exact = tuple(
-        FixedRate(link, unturned(link, link_coordinates(link, w.T).cosine, P))
-        for link, P in zip(field.links, held, strict=True)
-    )
-    further = maximize(
+    reached = _worth(problem, flight.w, precoders)
+    error = 0.0 if scheme.gaussian else optimum.value - reached
+    cutoff = problem.plan.optimizer.rate == "cutoff"
+    if not cutoff or all(_is_exact(rate) for rate in field.rates):
+        return flight, precoders, error
+    held = [
+        FixedRate(link, unturned(link, link_coordinates(link, flight.w.T).cosine, P))
+        for link, P in zip(field.links, precoders, strict=True)
+    ]
+    flight = maximize(
         kin,
-        RateField(field.links, exact),
-        optimum.trajectory,
+        RateField(field.links, tuple(held)),
+        flight,
         constraints=problem.constraints(kin),
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=_EXACT_ITERATIONS,
         strategy=WARM_START,
         relay=problem.maximised_queue,
-    )
-    return replace(optimum, trajectory=further.trajectory, value=further.value), held
+    ).trajectory
+    return flight, _designed(problem, scheme, flight.w, precoders), error
 
 
-def _rates(scheme: Design, field: RateField, w: Real) -> Real:
-    """Return the rates (2, n) at positions w with precoders that are made for Gaussian inputs."""
-    rates = []
-    for link in field.links:
-        H_r = link.small_scale(w)
-        rates.append(link.rates(w, H_r, scheme.precoders(link, link.channel(w, H_r))))
-    return np.stack(rates)
+def _is_exact(rate: RateModel) -> bool:
+    return not isinstance(rate, TableRate) or rate.kind != "modes" or rate.exact
 
 
-def _solution(
-    problem: Problem,
-    scheme: Design,
-    field: RateField,
-    final: LocalOptimum,
-    history: list[float],
-    by_start: dict[str, float],
-    held: list[Complex],
-) -> Solution:
-    """Return `final` with its precoders and rates, and how it came about.
-
-    The precoders are searched from those that were `held` on the way, if any were.
-    """
-    w = final.trajectory.w
-    fading, precoders = [], []
-    for k, (link, rate) in enumerate(zip(problem.links, field.rates, strict=True)):
-        H_r = link.small_scale(w)
-        H = link.channel(w, H_r)
-        fading.append(H_r)
-        precoders.append(
-            scheme.precoders(link, H, start=held[k])
-            if held
-            else _precoders(link, rate, scheme, w, H)
-        )
-    residual = f"stationary to {final.residual:.1e}"
-    solution = make_solution(
-        problem,
-        final.trajectory,
-        _pair(fading),
-        _pair(precoders),
-        history,
-        converged=final.converged,
-        ending=residual
-        if final.converged
-        else f"stopped after {final.iterations} steps, {residual}",
-    )
-    # Rates read off a table on the way are a little off; the last is not.
-    reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
-    most = np.inf if scheme.gaussian else reached
-    return replace(
-        solution,
-        history=np.array([*np.minimum(history, most).tolist(), reached]),
-        starts={name: min(value, most) for name, value in by_start.items()},
-    )
+def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
+    """Return what `problem` maximises, bit/s/Hz, at positions w (n, 2) with both `precoders`."""
+    rates = [
+        link.rates(w, link.small_scale(w), P)
+        for link, P in zip(problem.links, precoders, strict=True)
+    ]
+    values = objectives(np.stack(rates)[:, None], problem.kinematics, problem.maximised_queue)
+    return float(values[0])
 
 
-def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, H: Complex) -> Complex:
+def _designed(
+    problem: Problem, scheme: Design, w: Real, near: Sequence[Complex | None] = (None, None)
+) -> list[Complex]:
+    """Return the precoders of both links at w (n, 2) by `scheme`, searched from `near` ones."""
+    return [
+        scheme.precoders(link, link.channel(w, link.small_scale(w)), start=start)
+        for link, start in zip(problem.links, near, strict=True)
+    ]
+
+
+def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
     """Return the precoders at positions w (n, 2), searched from the best that `rate` knows.
 
-    From a table of two modes they are searched afresh too, and the better kept; from one of a
-    single mode that gained 2e-6 bit in the mean, on twelve random plans.
+    With known draws they are searched afresh too, and the better kept.
     """
-    where = link_coordinates(link, w.T)
-    at = where.gain_log, where.cosine
-    if not scheme.optimal or not isinstance(rate, TableRate | BestRate):
+    H = link.channel(w, link.small_scale(w))
+    at = link_coordinates(link, w.T)
+    known = rate.initial_precoders(at.gain_log, at.cosine) if scheme.optimal else None
+    if known is None:
         return scheme.precoders(link, H)
-    known = rate.initial_precoders(*at)
     if link.measure != "cutoff":
         return known
     carried = scheme.precoders(link, H, start=known)
-    if (isinstance(rate, TableRate) and rate.kind == "curve") or (
-        min(link.receive, link.transmit) == 1 and not rate.exact
-    ):
+    if scheme.averaged or link.nlos is None:
         return carried
     afresh = scheme.precoders(link, H)
-    if rate.exact:
-        return afresh
     better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
     return np.asarray(np.where(better[:, None, None], carried, afresh))
 

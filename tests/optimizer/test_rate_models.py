@@ -1,7 +1,6 @@
 """Rates as functions of the position: derivatives, and tables against exact values."""
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +11,8 @@ from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import rate_models
-from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate, FixedRate, unturned
+from faao_mav.optimizer.rates.slot_rate import FixedRate, SlotRate, unturned
 from faao_mav.optimizer.rates.table_rate import TableRate
-from faao_mav.radio.precoder import SCHEMES
-from faao_mav.radio.rate import cutoff_rate
 
 FARTHEST = 400.0
 
@@ -79,7 +76,7 @@ def test_the_envelope_theorem(small_plan: MakePlan, line_of_sight: str, hop: int
     """At the best precoders: the exact slope, and a curvature that is never too high."""
     plan = small_plan({"radio.line_of_sight": line_of_sight, "radio.fading": "realization"})
     link = build_problem(plan).links[hop]
-    w, rate = places(link), BestRate(link)
+    w, rate = places(link), SlotRate(link, design(plan))
 
     def best(at: Real) -> Real:
         return rate.value(*coordinates(link, at))
@@ -91,18 +88,15 @@ def test_the_envelope_theorem(small_plan: MakePlan, line_of_sight: str, hop: int
 
 
 def test_rates_by_differences(small_plan: MakePlan) -> None:
-    link = build_problem(small_plan({"radio.fading": "realization"})).bs_uav
-    w = places(link)
-
-    def scheme(H: Any) -> Real:
-        return cutoff_rate(H, SCHEMES["mmse"](H, link.power, link.noise), link.classes, link.noise)
-
-    rate = DifferencedRate(link, scheme)
+    plan = small_plan({"radio.fading": "realization", "optimizer.precoder": "mmse"})
+    link = build_problem(plan).bs_uav
+    w, rate = places(link), SlotRate(link, design(plan))
     gradient, hessian = derivatives(link, rate, w)
 
     def at(moved: Real) -> Real:
         return rate.value(*coordinates(link, moved))
 
+    assert at(w) == pytest.approx(exactly(link, design(plan), w))
     assert gradient == pytest.approx(gradient_by_differences(at, w), rel=1e-3, abs=1e-5)
     assert hessian == pytest.approx(hessian_by_differences(at, w), rel=1e-2, abs=1e-4)
 

@@ -9,7 +9,7 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 
 A rate model (``RateModel``) therefore works with l and u, and ``LinkCoordinates`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
-four models:
+three models:
 
 ====================  ==================================  =========================================
 model                 fading, precoders                   method
@@ -17,9 +17,8 @@ model                 fading, precoders                   method
 ``TableRate``         none or averaged over; known per    spline over l + shift and a second
                       slot, best precoders, two modes     coordinate, tables are kept
                       at most
-``BestRate``          known per slot, best precoders,     search in every slot, envelope theorem
-                      more modes
-``DifferencedRate``   known per slot, classical scheme    central differences
+``SlotRate``          known per slot, more modes, or a    the precoders of every slot; envelope
+                      classical scheme                    theorem, or central differences
 ``FixedRate``         given precoders                     exact slopes, differences of these
 ====================  ==================================  =========================================
 
@@ -34,7 +33,7 @@ from typing import Protocol
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.problem import Link
 
 
@@ -65,6 +64,9 @@ class RateModel(Protocol):
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
         """Return the rate and its derivatives, bits (..., n)."""
+
+    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex | None:
+        """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,), if known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

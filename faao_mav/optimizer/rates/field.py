@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
-from faao_mav.optimizer.rates.slot_rate import BestRate, DifferencedRate
+from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 
 
@@ -67,14 +67,5 @@ def rate_models(
             spans.append(np.log(link.reference_gain / squared_distance))
     tables = iter(table_rates(tabled, design, spans))
     return tuple(
-        next(tables) if kind_of(link, design) else _slot_rate(link, design) for link in links
+        next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links
     )
-
-
-def _slot_rate(link: Link, design: Design) -> RateModel:
-    """Return the rate model of a `link` with known draws that has no table."""
-
-    def rate_of(H: Complex) -> Real:
-        return design.rate(link, H, design.precoders(link, H))
-
-    return BestRate(link) if design.optimal else DifferencedRate(link, rate_of)

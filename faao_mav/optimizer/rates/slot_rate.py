@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import DirectionPartials, RatePartials
 from faao_mav.radio.class_sum import class_sum
@@ -17,48 +18,49 @@ _STEP = 1e-3
 """Step of l and u in central differences: derivatives of rates of a few bits err by about 1e-5."""
 
 
-class BestRate:
-    """The rate that counts at the best precoders, searched in every slot at every call.
+class SlotRate:
+    """The rate that counts at the precoders of `design`, made for every slot at every call.
 
-    By the envelope theorem its gradient is that at fixed best precoders. Its Hessian is that of
-    `FixedRate`; it never exceeds the true one. Each search starts from the precoders of the last
-    call.
+    For the best ones the gradient is that at fixed precoders, by the envelope theorem, and the
+    Hessian that of `FixedRate`, which never exceeds the true one; each search starts from the
+    precoders of the last call. Those of a classical scheme follow the channel by a rule of their
+    own, and the derivatives are central differences.
     """
 
-    exact = False
-    """Whether the best precoders have a closed form."""
-
-    def __init__(self, link: Link) -> None:
-        self.link = link
+    def __init__(self, link: Link, design: Design) -> None:
+        self.link, self.design = link, design
         self._last: Complex | None = None
 
-    def precoders(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return the best precoders (..., n, N_t, N_t) at l and u (..., n)."""
-        H = channel(self.link, gain_log, cosine)[..., None, :, :]
-        self._last = P = self.link.best(H, self._near(gain_log.shape))
-        return P
-
-    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return precoders (..., n, N_t, N_t) close to the best: those of the last call."""
-        near = self._near(gain_log.shape)
-        return self.precoders(gain_log, cosine) if near is None else near
-
-    def _near(self, shape: tuple[int, ...]) -> Complex | None:
-        """Return the last precoders for slots of `shape`, those of the first flight for others."""
-        if self._last is None or self._last.shape[:-2] == shape:
-            return self._last
-        one = self._last.reshape(-1, *self._last.shape[-3:])[0]
-        return np.broadcast_to(one, (*shape, *one.shape[1:]))
-
     def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate R of every slot, bits (n,)."""
-        P = self.precoders(gain_log, cosine)
-        return self.link.draw_rates(channel(self.link, gain_log, cosine), P)
+        """Return the rate R of every slot, bits (..., n)."""
+        H = self._channel(gain_log, cosine)
+        return self.design.rate(self.link, H, self._precoders(H))
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives with precoders that turn with the line of sight."""
-        P = self.precoders(gain_log, cosine)
+        """Return the rate and its derivatives by l and u, bits (..., n)."""
+        if not self.design.optimal:
+            both = self.link.follows_position
+            return by_differences(self.value, gain_log, cosine, both=both)
+        P = self._precoders(self._channel(gain_log, cosine))
         return FixedRate(self.link, unturned(self.link, cosine, P)).partials(gain_log, cosine)
+
+    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
+        """Return the precoders (..., n, N_t, N_t) at l and u (..., n)."""
+        return self._precoders(self._channel(gain_log, cosine))
+
+    def _channel(self, gain_log: Real, cosine: Real) -> Complex:
+        """Return H = e^(l/2) H_r of (1) or (2), (..., n, N_r, N_t), at l and u (..., n)."""
+        H_r = self.link.fade(self.link.line_of_sight_at(cosine))
+        return np.asarray(np.exp(gain_log / 2)[..., None, None] * H_r)
+
+    def _precoders(self, H: Complex) -> Complex:
+        near = self._last if self.design.optimal else None
+        if near is not None and near.shape[:-2] != H.shape[:-2]:  # those of the first flight
+            near = np.broadcast_to(
+                near.reshape(-1, *near.shape[-3:])[0], (*H.shape[:-2], *near.shape[-2:])
+            )
+        self._last = P = self.design.precoders(self.link, H, start=near)
+        return P
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,9 +76,13 @@ class FixedRate:
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (n,)."""
-        los = self.link.line_of_sight_at(cosine)
-        H = np.exp(gain_log / 2)[..., None, None] * self.link.fade(los)
-        return self.link.draw_rates(H, los[..., 0, :, None].conj() * self.Q)
+        H_r = self.link.fade(self.link.line_of_sight_at(cosine))
+        H = np.exp(gain_log / 2)[..., None, None] * H_r
+        return self.link.draw_rates(H, self.initial_precoders(gain_log, cosine))
+
+    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:  # noqa: ARG002
+        """Return P (..., n, N_t, N_t) at u (..., n)."""
+        return np.asarray(self.link.line_of_sight_at(cosine)[..., 0, :, None].conj() * self.Q)
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
         """Return the rate and its derivatives by l and u, bits (n,).
@@ -127,26 +133,6 @@ def unturned(link: Link, cosine: Real, P: Complex) -> Complex:
     return np.asarray(link.line_of_sight_at(cosine)[..., 0, :, None] * P)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DifferencedRate:
-    """Any rate of the channel, `rate_of(H)` (n,) bits, with derivatives by central differences.
-
-    It serves precoders that follow the channel by a rule of their own: the envelope theorem does
-    not hold for them.
-    """
-
-    link: Link
-    rate_of: Callable[[Complex], Real]
-
-    def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate R of every slot, bits (n,)."""
-        return self.rate_of(channel(self.link, gain_log, cosine))
-
-    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives by l and u, bits (n,), in error by about 1e-5."""
-        return by_differences(self.value, gain_log, cosine, both=self.link.follows_position)
-
-
 def by_differences(
     rate: Callable[[Real, Real], Real], gain_log: Real, cosine: Real, *, both: bool
 ) -> RatePartials:
@@ -164,9 +150,3 @@ def by_differences(
     by_lu = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * h**2)
     by_u, by_uu = (right - left) / (2 * h), (right - 2 * middle + left) / h**2
     return RatePartials(middle, by_l, by_ll, DirectionPartials(by_u, by_lu, by_uu))
-
-
-def channel(link: Link, gain_log: Real, cosine: Real) -> Complex:
-    """Return H = e^(l/2) H_r of (1) or (2), (..., n, N_r, N_t), at l and u (..., n)."""
-    H_r = link.fade(link.line_of_sight_at(cosine))
-    return np.asarray(np.exp(gain_log / 2)[..., None, None] * H_r)

@@ -25,9 +25,8 @@ _COARSE_TOLERANCE = 3e-3  # least tolerance on the copy, which differs from the 
 _COARSE_ERROR = 5e-3  # share of the best value within which starts are equally good on the copy
 _SAME = 0.02  # distance of flights that count as one, in the longer of their extents in x and y
 
-
-_EQUAL = 1e-6
-"""The difference of values, bit/s/Hz, below which starts are equally good: which of two is larger
+EQUAL = 1e-6
+"""The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
 is then up to rounding, and differs from machine to machine. Chosen."""
 
 
@@ -111,7 +110,7 @@ def improve_starts(
     )
     optima = dict(zip(flights, solved, strict=True))
     best = max(optimum.value for optimum in solved)
-    least = best - max(_EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
+    least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
     promising: list[str] = []
     for name in optima:  # of flights that count as one the first: values hang on rounding
         w = optima[name].trajectory.w
