@@ -92,8 +92,9 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
 
     The pairs of slot and draw are sampled evenly in the order of their cutoff rates. The mutual
     information is nearly a function of the cutoff rate: a polynomial through the sample, by least
-    squares, stands for all pairs. The standard error of the mean, bits, is that of the residuals,
-    which is left out where all pairs are in the sample, and that of the noises.
+    squares, stands for all pairs. The standard error of the mean, bits, is that of the noises and
+    that of what polynomials through one half of the sample are off in the other, which is left out
+    where all pairs are in the sample.
     """
     pairs = H.shape[:-2]
     wide = np.broadcast_to(P, (*pairs, *P.shape[-2:]))
@@ -116,7 +117,11 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
     fitted = np.clip(powers @ fit, 0.0, link.classes.bits)
     variance = sets.mean(axis=1).var(ddof=1) / _SEEDS
     if len(part) < len(H):
-        variance += np.sum((sample - fitted[part]) ** 2) / (len(part) - _DEGREE - 1) / len(part)
+        for half, other in ((0, 1), (1, 0)):
+            fit, *_ = np.linalg.lstsq(powers[part[half::2]], sample[half::2])
+            variance += (
+                np.mean((powers[part[other::2]] @ fit - sample[other::2]) ** 2) / len(part) / 2
+            )
     each = fitted.reshape(-1, pairs[-1]).mean(axis=0)
     return float(each.mean()), each, float(np.sqrt(variance))
 

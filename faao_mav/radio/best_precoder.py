@@ -213,8 +213,7 @@ def _information_objective(modes: Complex, modulation: str, nodes: int) -> Objec
     gram = modes.conj().mT @ modes * (-2 / np.log(2.0))
 
     def objective(at: Integers, Q: Complex) -> tuple[Real, Complex]:
-        found = information_and_errors(modes[at], Q[:, None], modulation, 1.0, nodes)
-        slope = np.mean(gram[at] @ Q[:, None] @ found.errors, axis=1)
-        return -found.value.mean(axis=1), slope
+        value, errors = information_and_errors(modes[at], Q[:, None], modulation, 1.0, nodes)
+        return -value.mean(axis=1), np.mean(gram[at] @ Q[:, None] @ errors, axis=1)
 
     return objective

@@ -20,9 +20,6 @@ from faao_mav.radio.constellation import constellation, symbol_vectors
 
 _LN2 = float(np.log(2.0))
 
-MAX_INPUTS = 1 << 16
-"""Input vectors accepted at most. Chosen: the time of a slot is proportional to their number."""
-
 NODES = 2048
 """Pairs of a vector sent and a noise, each used with both signs, for all draws of a channel.
 
@@ -42,9 +39,6 @@ smallest P_2 figures over 2^5 to 2^10 points in 3 to 9 dimensions."""
 _RAREST = 1e-9
 """Probability of the noises beyond the largest that is used, 6 standard deviations. Chosen."""
 
-_HELD = 1 << 20
-"""Pairs of channel and noise held at once: 8 MB for each number that is kept of them. Chosen."""
-
 _CHUNK = 1 << 18
 """Likelihoods held at once: 2 MB, which stay in a processor's cache. Chosen."""
 
@@ -53,72 +47,29 @@ _NOISES = 128
 
 
 @dataclass(frozen=True, eq=False)
-class RealInputs:
-    """The M input vectors as real vectors, and those over which it is enough to average.
+class NoiseSet:
+    """What is sent, and the noise that it meets, for each of S draws of a channel.
 
-    `points` (M, D) are all of them in real coordinates, [x] for BPSK and [Re x, Im x] else. `sent`
-    (r,) are the rows of ``points`` to average over; the others contribute the same by symmetry.
-    `bits` is log2 M, bit per channel use.
+    `points` (M, D) are all input vectors x of (3) in real coordinates, [x] for BPSK and [Re x,
+    Im x] else; `sent` (S, q) counts their rows; the noises `z` (S, q, D) are N(0, I).
     """
 
     points: Real
     sent: Integers
-    bits: float
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseSet:
-    """What is sent, and the noise that it meets, for each of S draws of a channel.
-
-    `sent` (S, q) counts the rows of `inputs.points`; the noises `z` (S, q, D) are N(0, I).
-    """
-
-    inputs: RealInputs
-    sent: Integers
     z: Real
 
 
-@dataclass(frozen=True, eq=False)
-class Information:
-    """The mutual information of every draw, and how far the best estimate of what is sent errs.
+def _sent(modulation: str, antennas: int) -> Integers:
+    """Return the rows of ``symbol_vectors`` over which it is enough to average.
 
-    Attributes:
-        value: (b, S) bits; accurate is the mean over the S draws.
-        errors: (b, S, N_t, N_t), E[(x - x^)(x - x^)^H] with x^ the mean of x given y.
-    """
-
-    value: Real
-    errors: Complex
-
-
-def real_inputs(modulation: str, antennas: int) -> RealInputs:
-    """Return the input vectors x of (3) in real coordinates.
-
-    Raises `InputError` for an unknown modulation or more than 65,536 input vectors.
-
-    >>> inputs = real_inputs("qpsk", 1)
-    >>> inputs.points.shape, inputs.sent.tolist(), inputs.bits
-    ((4, 2), [3], 2.0)
+    A rotation that maps the alphabet onto itself maps the noise onto equally likely noise: vectors
+    that differ by one contribute the same, and no vector is left fixed.
     """
     symbols = constellation(modulation)
-    size = len(symbols) ** antennas
-    if size > MAX_INPUTS:
-        raise InputError(
-            f"{modulation} on {antennas} antennas has {size} input vectors; "
-            f"the mutual information is computed for up to {MAX_INPUTS}"
-        )
-    x = symbol_vectors(modulation, antennas)
-    # A rotation that maps the alphabet onto itself maps the noise onto equally likely noise:
-    # vectors that differ by one contribute the same, and no vector is left fixed.
-    if modulation == "bpsk":
-        points, keep = x.real, symbols.real > 0.0
-    else:
-        points = np.hstack([x.real, x.imag])
-        sector = 2.0 * np.pi / (8 if modulation == "8psk" else 4)
-        keep = (np.angle(symbols) + 1e-9) % (2.0 * np.pi) < sector
+    sector = 2.0 * np.pi / {"bpsk": 2, "8psk": 8}.get(modulation, 4)
+    keep = (np.angle(symbols) + 1e-9) % (2.0 * np.pi) < sector
     # The first entry runs slowest in symbol_vectors.
-    sent = np.flatnonzero(np.repeat(keep, size // len(symbols)))
-    return RealInputs(np.ascontiguousarray(points), sent, float(np.log2(size)))
+    return np.flatnonzero(np.repeat(keep, len(symbols) ** (antennas - 1)))
 
 
 @lru_cache(maxsize=16)
@@ -134,8 +85,9 @@ def noise_set(
     >>> noise_set("bpsk", 1, 4).z.shape
     (4, 1024, 1)
     """
-    inputs = real_inputs(modulation, antennas)
-    dimensions = inputs.points.shape[1]
+    x = symbol_vectors(modulation, antennas)
+    points = x.real if modulation == "bpsk" else np.hstack([x.real, x.imag])
+    dimensions = points.shape[1]
     half = (dimensions + 1) // 2
     each = 2 ** max(0, round(float(np.log2(nodes / draws))))
     shares = 2 ** int(np.ceil(np.log2(draws)))
@@ -147,11 +99,13 @@ def noise_set(
     even = np.minimum(even, 1.0 - _RAREST)
     # in random order: draws that change slowly from one to the next would meet few of the vectors
     even = even.reshape(each, shares, -1).swapaxes(0, 1)[rng.permutation(shares)[:draws]]
-    sent = inputs.sent[(even[..., 0] * len(inputs.sent)).astype(np.intp)]
+    kept = _sent(modulation, antennas)
+    sent = kept[(even[..., 0] * len(kept)).astype(np.intp)]
     radius = np.sqrt(-2.0 * np.log1p(-even[..., 1 : 1 + half]))
     angle = 2.0 * np.pi * even[..., 1 + half :]
     z = np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], -1)[..., :dimensions]
-    return NoiseSet(inputs, np.hstack([sent, sent]), np.hstack([z, -z]))
+    points = np.ascontiguousarray(points)
+    return NoiseSet(points, np.hstack([sent, sent]), np.hstack([z, -z]))
 
 
 def mutual_information(
@@ -174,7 +128,7 @@ def mutual_information(
         seed: another gives other noises; the spread over seeds is the standard error.
 
     Raises:
-        InputError: unknown modulation, a noise not above 0, or more than 65,536 input vectors.
+        InputError: unknown modulation or a noise not above 0.
 
     >>> one = np.ones((1, 1, 1))
     >>> mutual_information(one, one, "bpsk", 1.0).round(3)  # exactly 0.721452
@@ -185,40 +139,60 @@ def mutual_information(
     A = np.asarray(H, dtype=np.complex128) @ P
     flat = A.reshape(-1, *A.shape[-3:])
     used = noise_set(modulation, A.shape[-1], A.shape[-3], nodes, seed)
-    return _averages(flat, used, noise, real=modulation == "bpsk").reshape(A.shape[:-2])
+    return _averages(flat, used, noise, errors=None).reshape(A.shape[:-2])
 
 
 def information_and_errors(
     H: Complex, P: Complex, modulation: str, noise: float, nodes: int = NODES
-) -> Information:
-    """Return the information and the errors at H (b, S, N_r, N_t) and P (b, S or 1, N_t, N_t)."""
+) -> tuple[Real, Complex]:
+    """Return the information and the errors at H (b, S, N_r, N_t) and P (b, S or 1, N_t, N_t).
+
+    The information (b, S), bits, is that of ``mutual_information``; the errors (b, S, N_t, N_t) are
+    E[(x - x^)(x - x^)^H] with x^ the mean of x given what is received.
+    """
     A = H @ P
-    errors = np.empty((*A.shape[:2], A.shape[-1], A.shape[-1]), dtype=np.complex128)
+    errors = np.zeros((*A.shape[:2], A.shape[-1], A.shape[-1]), dtype=np.complex128)
     used = noise_set(modulation, A.shape[-1], A.shape[1], nodes)
-    return Information(_averages(A, used, noise, errors, real=modulation == "bpsk"), errors)
+    return _averages(A, used, noise, errors), errors
 
 
-def _averages(
-    A: Complex, used: NoiseSet, noise: float, errors: Complex | None = None, *, real: bool
-) -> Real:
-    """Return the information (b, S) at A = H P (b, S, N_r, N_t), and fill `errors` if asked for."""
+def _averages(A: Complex, used: NoiseSet, noise: float, errors: Complex | None) -> Real:
+    """Return the information (b, S) at A = H P (b, S, N_r, N_t), and fill `errors` if asked for.
+
+    It is N log2(rho) less the mean of log2 Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z. With
+    ||y - s_k||² expanded, all exponents are one product of matrices. That of the vector sent is
+    -||z||² / 2: the sum never underflows for noises that are drawn.
+    """
     b, S, _, N = A.shape
-    points, q = used.inputs.points, used.z.shape[1]
-    maps = _maps(A.reshape(b * S, *A.shape[2:]), noise, real=real)
-    value, step = np.empty(b * S), max(1, _HELD // q)
+    points, q = used.points, used.z.shape[1]
+    maps = _maps(A.reshape(b * S, *A.shape[2:]), noise, real=points.shape[1] == N)
+    value = np.zeros(b * S)
     missed_products = None if errors is None else errors.reshape(b * S, N, N)
-    for start in range(0, b * S, step):
-        part = slice(start, start + step)
-        draw = np.arange(b * S)[part] % S
-        sent, z = used.sent[draw], used.z[draw]
-        estimates = None if errors is None else np.empty(z.shape)
-        value[part] = log_ratio(points, maps[part], sent, z, estimates).mean(axis=1)
-        if missed_products is not None and estimates is not None:
-            missed = points[sent] - estimates
-            x = missed if real else missed[..., :N] + 1j * missed[..., N:]
-            missed_products[part] = x.mT @ x.conj() / q
+    # Long rows of noises keep the inner loops long; the rest of the room goes to channels.
+    group = max(1, _CHUNK // (len(points) * min(q, _NOISES)))
+    step = max(1, _CHUNK // (len(points) * group))
+    for first in range(0, b * S, group):
+        channels = np.arange(first, min(first + group, b * S))
+        s = points @ maps[channels]
+        ones = np.ones((*s.shape[:2], 1))
+        left = np.concatenate([s, -0.5 * np.sum(s**2, axis=-1, keepdims=True), -ones], axis=-1)
+        for start in range(0, q, step):
+            part = slice(start, start + step)
+            sent, z = used.sent[channels % S, part], used.z[channels % S, part]
+            y = np.take_along_axis(s, sent[..., None], axis=1) + z
+            half = 0.5 * np.sum(y**2, axis=-1, keepdims=True)
+            right = np.concatenate([y, np.ones_like(half), half], axis=-1)
+            likelihood = left @ right.mT
+            np.exp(likelihood, out=likelihood)
+            total = likelihood.sum(axis=1)
+            value[channels] += np.sum(np.log(total) + 0.5 * np.sum(z**2, axis=-1), axis=1)
+            if missed_products is not None:
+                missed = points[sent] - (likelihood.mT @ points) / total[..., None]
+                x = missed if missed.shape[-1] == N else missed[..., :N] + 1j * missed[..., N:]
+                missed_products[channels] += x.mT @ x.conj() / q
     # The sum in (5) is never below its own term: only rounding makes its logarithm negative.
-    return np.asarray(used.inputs.bits - np.maximum(value, 0.0) / _LN2).reshape(b, S)
+    bits = np.log2(len(points))
+    return np.asarray(bits - np.maximum(value / q, 0.0) / _LN2).reshape(b, S)
 
 
 def _maps(A: Complex, noise: float, *, real: bool) -> Real:
@@ -234,37 +208,3 @@ def _maps(A: Complex, noise: float, *, real: bool) -> Real:
     upper, lower = (root.real, -root.imag), (root.imag, root.real)
     rows = [np.concatenate(parts, axis=-1) for parts in (upper, lower)]
     return np.concatenate(rows, axis=-2).mT
-
-
-def log_ratio(
-    points: Real, maps: Real, sent: Integers, z: Real, estimates: Real | None = None
-) -> Real:
-    """Compute ln Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z, for every slot and noise.
-
-    ``points`` (M, D) and ``maps`` (n, D, d) make s, ``sent`` (n, q) says m, ``z`` is (n, q, d);
-    the result is (n, q). With ||y - s_k||² expanded, all exponents are one product of matrices.
-    That of the vector sent is -||z||² / 2: the sum never underflows for noises that are drawn.
-    ``estimates`` (n, q, D), where given, is filled with the means of the points given y.
-    """
-    result = np.empty(sent.shape)
-    # Long rows of noises keep the inner loops long; the rest of the room goes to slots.
-    group = max(1, _CHUNK // (len(points) * min(sent.shape[1], _NOISES)))
-    step = max(1, _CHUNK // (len(points) * group))
-    for first in range(0, len(maps), group):
-        slots = slice(first, first + group)
-        S = points @ maps[slots]
-        ones = np.ones((*S.shape[:2], 1))
-        left = np.concatenate([S, -0.5 * np.sum(S**2, axis=-1, keepdims=True), -ones], axis=-1)
-        for start in range(0, sent.shape[1], step):
-            part = slice(start, start + step)
-            noise = z[slots, part]
-            y = np.take_along_axis(S, sent[slots, part, None], axis=1) + noise
-            half = 0.5 * np.sum(y**2, axis=-1, keepdims=True)
-            right = np.concatenate([y, np.ones_like(half), half], axis=-1)
-            logs = left @ np.swapaxes(right, 1, 2)
-            np.exp(logs, out=logs)
-            total = logs.sum(axis=1)
-            result[slots, part] = np.log(total) + 0.5 * np.sum(noise**2, axis=-1)
-            if estimates is not None:
-                estimates[slots, part] = (logs.mT @ points) / total[..., None]
-    return result

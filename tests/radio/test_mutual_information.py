@@ -151,7 +151,7 @@ def test_only_the_gram_matrix_matters() -> None:
 def test_the_errors_give_the_slope(modulation: str) -> None:
     """I-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)."""
     H, P, change = channel(6, 1, 1, 2, 2), channel(7, 1, 1, 2, 2), 1e-4 * channel(8, 1, 1, 2, 2)
-    errors = information_and_errors(H, P, modulation, 0.75).errors
+    _, errors = information_and_errors(H, P, modulation, 0.75)
     gradient = 2 * (H.conj().mT @ H @ P @ errors).mean(axis=1) / (0.75 * np.log(2.0))
     up, down = (
         mutual_information(H, P + step, modulation, 0.75).mean() for step in (change, -change)
@@ -163,5 +163,3 @@ def test_the_errors_give_the_slope(modulation: str) -> None:
 def test_what_is_refused() -> None:
     with pytest.raises(InputError, match="noise"):
         mutual_information(ONE, ONE, "bpsk", 0.0)
-    with pytest.raises(InputError, match=r"64qam on 4 antennas has 16777216 input vectors"):
-        mutual_information(np.eye(4)[None], np.eye(4)[None], "64qam", 1.0)
