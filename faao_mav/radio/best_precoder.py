@@ -43,10 +43,8 @@ _SATURATED = 40.0
 """The smallest exponent beyond which no rate can tell precoders apart: of stronger links the search
 is done at the power where it is this, since F bends more the higher the SNR. Chosen."""
 
-_RANDOM_STARTS, _MORE_RANDOM_STARTS, _FEW_CHANNELS = 4, 12, 12
-"""Random starts per channel; the larger number for draws of a channel, whose optima have less
-structure, and for fewer than so many channels, which have few neighbours to take over from.
-Chosen."""
+_RANDOM_STARTS = 12
+"""Random starts for each channel. Chosen."""
 
 _DRAWS, _KEPT = 16, 4
 """About how many draws of a channel all starts are improved for first, and how many results, those
@@ -165,8 +163,7 @@ def _best_cutoff(
     if start is not None:
         Q, _ = minimise(_cutoff_objective(sums, _levelled(sums, G, start[None])), start, _FINE)
         return Q[None]
-    random = _MORE_RANDOM_STARTS if S > 1 or b < _FEW_CHANNELS else _RANDOM_STARTS
-    starts = starting_points(gains, antennas, random)
+    starts = starting_points(gains, antennas, _RANDOM_STARTS)
     G = _levelled(sums, G, starts)
     draws = slice(None, None, max(1, S // _DRAWS))
     objective, few = _cutoff_objective(sums, G), _cutoff_objective(sums, G[:, draws])

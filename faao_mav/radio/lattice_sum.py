@@ -14,7 +14,6 @@ over the classes by rounding only.
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.radio.constellation import Lattice
 from faao_mav.radio.quadratic_form import coordinates, features
 
 _BLOCK = 1 << 18
@@ -36,12 +35,13 @@ class LatticeSum:
     True
     """
 
-    def __init__(self, lattice: Lattice, antennas: int, symbols: int) -> None:
-        self._squares = lattice.values ** np.arange(3)[:, None]
-        self._powers = lattice.counts * self._squares
+    def __init__(self, lattice: Real, antennas: int, symbols: int) -> None:
+        values, pairs = lattice
+        self._squares = values ** np.arange(3)[:, None]
+        self._powers = pairs * self._squares
         alone, counts = _quarter(lattice, 1)
         self._alone = np.abs(alone[:, 0]) ** 2
-        shares = counts / np.sum(lattice.counts)  # the other streams are alike in rho^(N - 1) pairs
+        shares = counts / np.sum(pairs)  # the other streams are alike in rho^(N - 1) pairs
         self._alone_terms = self._alone[:, None] ** np.arange(2) * shares[:, None]
         self._rest, counts = _quarter(lattice, antennas - 1)
         self._weights = counts / symbols
@@ -92,14 +92,15 @@ class LatticeSum:
         )
 
 
-def _quarter(lattice: Lattice, antennas: int) -> tuple[Complex, Real]:
+def _quarter(lattice: Real, antennas: int) -> tuple[Complex, Real]:
     """Return one of each four differences (k, N) that turns of 90° exchange, and their pairs (k,).
 
     Its first entry other than 0 is in the first quadrant; the zero difference is left out.
     """
-    parts = np.indices((len(lattice.values),) * 2 * antennas).reshape(antennas, 2, -1)
-    real, imaginary = lattice.values[parts].swapaxes(0, 1)
+    values, pairs = lattice
+    parts = np.indices((len(values),) * 2 * antennas).reshape(antennas, 2, -1)
+    real, imaginary = values[parts].swapaxes(0, 1)
     u = (real + 1j * imaginary).T
     first = u[np.arange(len(u)), np.argmax(u != 0.0, axis=1)]
     chosen = (first.real > 0.0) & (first.imag >= 0.0)
-    return u[chosen], 4.0 * lattice.counts[parts].prod(axis=(0, 1))[chosen]
+    return u[chosen], 4.0 * pairs[parts].prod(axis=(0, 1))[chosen]

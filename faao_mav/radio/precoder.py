@@ -59,13 +59,14 @@ def _from_gains(U: Complex, gains: Real, Vh: Complex, power: float) -> Complex:
     return with_power(np.pad(P, [(0, 0)] * (P.ndim - 1) + [(0, missing)]), power)
 
 
-def mrt(H: RealOrComplex, power: float) -> Complex:
+def mrt(H: RealOrComplex, power: float, noise: float) -> Complex:  # noqa: ARG001
     """Return the precoder of maximum-ratio transmission, P ∝ H^H, (..., N_t, N_t).
 
-    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module), `power` is W, W. Raises
-    `InputError` for a power not above 0.
+    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module), `power` is W and `noise` σ², W, as
+    for all schemes, which raise `InputError` for a power or a noise that they need and that is not
+    above 0.
 
-    >>> mrt(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0).real.round(12)
+    >>> mrt(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0, 1.0).real.round(12)
     array([[3., 0.],
            [0., 4.]])
     """
@@ -73,14 +74,12 @@ def mrt(H: RealOrComplex, power: float) -> Complex:
     return _from_gains(U, s, Vh, power)
 
 
-def zf(H: RealOrComplex, power: float) -> Complex:
+def zf(H: RealOrComplex, power: float, noise: float) -> Complex:  # noqa: ARG001
     """Return the zero-forcing precoder, P ∝ H^+, the pseudo-inverse: H P is diagonal.
 
-    The result is (..., N_t, N_t). Directions in which H is zero to within rounding are left out.
-    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module), `power` is W, W. Raises
-    `InputError` for a power not above 0.
+    Directions in which H is zero to within rounding are left out.
 
-    >>> zf(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0).real.round(12)
+    >>> zf(np.array([[3.0, 0.0], [0.0, 4.0]]), 25.0, 1.0).real.round(12)
     array([[4., 0.],
            [0., 3.]])
     """
@@ -93,13 +92,10 @@ def zf(H: RealOrComplex, power: float) -> Complex:
 def mmse(H: RealOrComplex, power: float, noise: float) -> Complex:
     """Return the regularised zero-forcing (MMSE) precoder, P ∝ H^H (H H^H + (N_r σ²/W) I)^-1.
 
-    It tends to zero forcing as the noise vanishes and to maximum ratio as it takes over. Source:
-    Peel, Hochwald and Swindlehurst, "A vector-perturbation technique for near-capacity multiantenna
-    multiuser communication, part I", IEEE Trans. Commun. 53 (2005).
-
-    `H` (..., N_r, N_t) are channels (N_r ≠ N_t: see the module; N_r is then min(N_r, N_t)), `power`
-    is W and `noise` σ², W; the result is (..., N_t, N_t). Raises `InputError` for a power or a
-    noise not above 0.
+    It tends to zero forcing as the noise vanishes and to maximum ratio as it takes over; N_r is
+    that of the square channel. Source: Peel, Hochwald and Swindlehurst, "A vector-perturbation
+    technique for near-capacity multiantenna multiuser communication, part I", IEEE Trans. Commun.
+    53 (2005).
 
     >>> mmse(np.array([[1.0, 0.0], [0.0, 3.0]]), 2.0, 3.0).real.round(12)
     array([[1., 0.],
@@ -114,9 +110,7 @@ def mmse(H: RealOrComplex, power: float, noise: float) -> Complex:
 def waterfilling(H: RealOrComplex, power: float, noise: float) -> Complex:
     """Return the optimal precoder for Gaussian inputs, P = V diag(√p) with H = U S V^H.
 
-    p_i = max(0, μ - σ²/s_i²), the water level μ such that Σ p_i = W. `H` (..., N_r, N_t) are
-    channels, `power` is W and `noise` σ², W; the result is (..., N_t, N_t). Raises `InputError` for
-    a power or a noise not above 0.
+    p_i = max(0, μ - σ²/s_i²), the water level μ such that Σ p_i = W.
 
     >>> waterfilling(np.diag([1.0, 0.5]), 5.0, 1.0).real.round(12) ** 2
     array([[4., 0.],
@@ -135,8 +129,7 @@ def waterfilling(H: RealOrComplex, power: float, noise: float) -> Complex:
         r = np.maximum(1, np.sum(active, axis=-1, keepdims=True))
         p = np.where(active, np.take_along_axis(level, r - 1, axis=-1) - floor, 0.0)
     p = np.pad(p, [(0, 0)] * (p.ndim - 1) + [(0, Vh.shape[-1] - p.shape[-1])])
-    V = Vh.conj().mT
-    return with_power(V * np.sqrt(p)[..., None, :], power)
+    return with_power(Vh.conj().mT * np.sqrt(p)[..., None, :], power)
 
 
 def bpsk_two_antennas(H: RealOrComplex, power: float) -> Complex:
@@ -161,11 +154,6 @@ def bpsk_two_antennas(H: RealOrComplex, power: float) -> Complex:
 
 
 SCHEMES: Mapping[str, Scheme] = MappingProxyType(
-    {
-        "mrt": lambda H, power, noise: mrt(H, power),  # noqa: ARG005
-        "zf": lambda H, power, noise: zf(H, power),  # noqa: ARG005
-        "mmse": mmse,
-        "waterfilling": waterfilling,
-    }
+    {"mrt": mrt, "zf": zf, "mmse": mmse, "waterfilling": waterfilling}
 )
-"""The classical schemes by name, each called with (H, power, noise)."""
+"""The classical schemes by name."""

@@ -61,23 +61,23 @@ def test_zero_forcing_makes_the_link_diagonal() -> None:
     for receive, transmit in SHAPES:
         if receive <= transmit:
             H = channel(2, receive, transmit)
-            link = H @ zf(H, 3.0)
+            link = H @ zf(H, 3.0, 1.0)
             expected = np.zeros((receive, transmit))
             np.fill_diagonal(expected, link[0, 0].real)
             np.testing.assert_allclose(link, expected, atol=1e-10)
             assert link[0, 0].real > 0.0
     # With more receiving antennas, the link is orthogonal: no stream disturbs another.
-    link = (H := channel(3, 4, 2)) @ zf(H, 3.0)
+    link = (H := channel(3, 4, 2)) @ zf(H, 3.0, 1.0)
     parallel(link.conj().T @ link, np.eye(2))
 
 
 def test_maximum_ratio_is_matched_to_the_channel() -> None:
     H = channel(4, 3, 3)
-    parallel(mrt(H, 2.0), H.conj().T)
+    parallel(mrt(H, 2.0, 1.0), H.conj().T)
     H = channel(4, 2, 3)
-    parallel(mrt(H, 2.0), np.hstack([H.conj().T, np.zeros((3, 1))]))
+    parallel(mrt(H, 2.0, 1.0), np.hstack([H.conj().T, np.zeros((3, 1))]))
     H = channel(4, 4, 2)
-    P = mrt(H, 2.0)
+    P = mrt(H, 2.0, 1.0)
     parallel(P @ P, H.conj().T @ H)
     parallel(P, P.conj().T)
 
@@ -85,8 +85,8 @@ def test_maximum_ratio_is_matched_to_the_channel() -> None:
 @pytest.mark.parametrize(("receive", "transmit"), SHAPES)
 def test_mmse_lies_between_maximum_ratio_and_zero_forcing(receive: int, transmit: int) -> None:
     H = channel(5, receive, transmit)
-    np.testing.assert_allclose(mmse(H, 2.0, 1e-12), zf(H, 2.0), atol=1e-8)
-    np.testing.assert_allclose(mmse(H, 2.0, 1e12), mrt(H, 2.0), atol=1e-8)
+    np.testing.assert_allclose(mmse(H, 2.0, 1e-12), zf(H, 2.0, 1.0), atol=1e-8)
+    np.testing.assert_allclose(mmse(H, 2.0, 1e12), mrt(H, 2.0, 1.0), atol=1e-8)
     if receive == transmit:
         inverse = np.linalg.inv(H @ H.conj().T + receive * 0.7 / 2.0 * np.eye(receive))
         parallel(mmse(H, 2.0, 0.7), H.conj().T @ inverse)
