@@ -54,11 +54,6 @@ def _grid(modulation: str) -> tuple[Complex, float]:
     return grid, float(1.0 / np.sqrt(np.mean(np.abs(grid) ** 2)))
 
 
-def _check_antennas(antennas: int) -> None:
-    if antennas < 1:
-        raise InputError(f"a transmitter needs at least one antenna, got {antennas}")
-
-
 def _product(values: Complex, antennas: int) -> Complex:
     """Return all vectors with entries from ``values``, the last entry running fastest."""
     index = np.indices((len(values),) * antennas).reshape(antennas, -1)
@@ -85,12 +80,11 @@ def constellation(modulation: str) -> Complex:
 def symbol_vectors(modulation: str, antennas: int) -> Complex:
     """Return all input vectors x of (3), (rho**N, N) complex with E[x x^H] = I; read-only.
 
-    Raises `InputError` for an unknown modulation or fewer than one antenna.
+    Raises `InputError` for an unknown modulation.
 
     >>> symbol_vectors("bpsk", 2).real.tolist()
     [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]
     """
-    _check_antennas(antennas)
     vectors = _product(constellation(modulation), antennas)
     vectors.setflags(write=False)
     return vectors
@@ -134,12 +128,11 @@ def difference_vector_count(modulation: str, antennas: int) -> int:
     """Return how many distinct difference vectors ``difference_classes`` has to go through.
 
     Its time and memory are proportional to this number, which is known without allocating. Raises
-    `InputError` for an unknown modulation or fewer than one antenna.
+    `InputError` for an unknown modulation.
 
     >>> difference_vector_count("64qam", 2), difference_vector_count("64qam", 4)
     (50625, 2562890625)
     """
-    _check_antennas(antennas)
     grid, _ = _grid(modulation)
     return int(len(_scalar_differences(grid)[0]) ** antennas)
 
@@ -151,13 +144,12 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     Two vectors differ by a unit phase exactly if u u^H is the same, so the entries of u u^H,
     exact on the integer grids and rounded for 8-PSK, identify a class. Pairs are never enumerated:
     the distinct differences of single symbols are counted and combined over the antennas. Raises
-    `InputError` for an unknown modulation or fewer than one antenna.
+    `InputError` for an unknown modulation.
 
     >>> classes = difference_classes("bpsk", 2)
     >>> classes.multiplicity.tolist(), classes.symbols, classes.bits
     ([4.0, 4.0, 2.0, 2.0], 4, 2.0)
     """
-    _check_antennas(antennas)
     grid, scale = _grid(modulation)
     values, counts = _scalar_differences(grid)
     u = _product(values, antennas)

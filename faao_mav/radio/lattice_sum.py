@@ -59,12 +59,13 @@ class LatticeSum:
         Z is positive semidefinite, |Z_1j|² <= Z_11 Z_jj: however weak the first stream is, no term
         is larger than those of u^H Z u itself, and rounding errors are those of Z.
         """
-        others = self._rest.shape[1]
-        own, diagonal = z[:, :1], z[:, 1 : 1 + others]
-        crossed, beyond = z[:, 1 + others : 1 + 3 * others], z[:, 1 + 3 * others :]
+        N = self._rest.shape[1] + 1
+        first = np.arange(N, 2 * N - 1)  # Re Z_1j, and with as many pairs more Im Z_1j
+        pairs = N * (N - 1) // 2
+        own, Z_1r = z[:, :1], z[:, first] + 1j * z[:, first + pairs]
+        among = np.delete(np.arange(1, N * N), np.r_[first, first + pairs] - 1)
         # Of streams without power w is 0 / 0, and any will do.
         inverse = np.divide(1.0, own, out=np.zeros_like(own), where=own >= _TINY)
-        Z_1r = crossed[:, ::2] + 1j * crossed[:, 1::2]
         w = Z_1r @ self._rest.T
         row = np.stack([w.real, w.imag])
         # Z_11 (u + w)² of either part of u_1, by powers of it.
@@ -72,24 +73,18 @@ class LatticeSum:
         D = self._squares.T @ D.reshape(3, -1)
         moments = self._powers @ np.exp(D, out=D)
         x, y = moments.reshape(3, *row.shape).swapaxes(0, 1)
-        schur = np.concatenate([diagonal, beyond], axis=1)
-        schur = schur - inverse * coordinates(Z_1r.conj()[:, :, None] * Z_1r[:, None, :])
+        schur = z[:, among] - inverse * coordinates(Z_1r.conj()[:, :, None] * Z_1r[:, None, :])
         x *= np.exp(-(schur @ self._rest_features.T)) * self._weights
 
         near = np.exp(-own * self._alone) @ self._alone_terms
         total = x[0] * y[0]
-        energy = np.sum(x[2] * y[0] + x[0] * y[2], axis=1) + near[:, 1]
         with_first = 2.0 * ((x[1] * y[0] + 1j * x[0] * y[1]) @ self._rest.conj())
-        among = total @ self._rest_features
-        return np.column_stack(
-            [
-                np.sum(total, axis=1) + near[:, 0],
-                energy,
-                among[:, :others],
-                np.stack([with_first.real, with_first.imag], axis=-1).reshape(len(z), -1),
-                among[:, others:],
-            ]
-        )
+        sums = np.empty((len(z), 1 + N * N))
+        sums[:, 0] = np.sum(total, axis=1) + near[:, 0]
+        sums[:, 1] = np.sum(x[2] * y[0] + x[0] * y[2], axis=1) + near[:, 1]
+        sums[:, 1 + first], sums[:, 1 + first + pairs] = with_first.real, with_first.imag
+        sums[:, 1 + among] = total @ self._rest_features
+        return sums
 
 
 def _quarter(lattice: Real, antennas: int) -> tuple[Complex, Real]:

@@ -139,15 +139,12 @@ def bpsk_two_antennas(H: RealOrComplex, power: float) -> Complex:
     of H. It reaches R_0 = 2 (1 - log2(1 + e^-x)), x = W λ_1² / (2 σ²), λ_1 the largest singular
     value of H. Source: derived for this project; no numerical search has found a better one.
 
-    `H` (..., N_r, 2) are channels, `power` is W, W. Raises `InputError` for other than two
-    transmitting antennas or a power not above 0.
+    `H` (..., N_r, 2) are channels, `power` is W, W. Raises `InputError` for a power not above 0.
 
     >>> np.abs(bpsk_two_antennas(np.diag([1.0, 2.0]), 2.0)).round(12)
     array([[0., 0.],
            [1., 1.]])
     """
-    if np.shape(H)[-1] != 2:
-        raise InputError(f"this optimum is for two transmitting antennas, not {np.shape(H)[-1]}")
     _, _, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=False)
     v = np.conj(Vh[..., 0, :])
     return with_power(v[..., :, None] * np.array([1.0, 1j]), power)

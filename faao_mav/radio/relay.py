@@ -57,13 +57,16 @@ class RelayQueue:
     def relayed(
         self, I_U: Real, I_G: Real, time_step: float, shares: Real | None = None
     ) -> Relayed:
-        """Return what is delivered at rates (n,): greedily, with given or else the best shares."""
+        """Return what is delivered at rates (n,): greedily, with given or else the best shares.
+
+        Of each slot a share is for receiving: its rates are that of I_U and the rest of I_G.
+        """
         room = self.buffer / time_step
-        if not self.half:
-            return forward_greedily(I_U, I_G, room)
-        if shares is None:
-            shares = best_shares(I_U, I_G, room)
-        return forward_by_shares(I_U, I_G, shares, room)
+        if self.half:
+            if shares is None:
+                shares = best_shares(I_U, I_G, room)
+            I_U, I_G = shares * I_U, (1 - shares) * I_G
+        return forward_greedily(I_U, I_G, room)
 
 
 def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
@@ -89,26 +92,14 @@ def forward_greedily(I_U: Real, I_G: Real, buffer: float = math.inf) -> Relayed:
     return Relayed(received, forwarded, queue)
 
 
-def forward_by_shares(I_U: Real, I_G: Real, shares: Real, buffer: float = math.inf) -> Relayed:
-    """Return what a half-duplex relay delivers that receives in the `shares` (n,) of each slot.
-
-    The rates are `shares` I_U and (1 - `shares`) I_G; within them it forwards what it holds: see
-    `forward_greedily`. Raises `InputError` for shares outside 0 to 1.
-    """
-    if shares.shape != I_U.shape or not ((shares >= 0) & (shares <= 1)).all():
-        raise InputError(f"shares {shares.shape}: expected one of 0 to 1 for each of {len(I_U)}")
-    return forward_greedily(shares * I_U, (1 - shares) * I_G, buffer)
-
-
 def best_shares(I_U: Real, I_G: Real, buffer: float = math.inf) -> Real:
     """Return the shares (n,) of the slots to receive in with which a route delivers most.
 
     Each slot brings the queue as near as it can to the level that is best for the slots after it:
     see `queue_levels`. Raises `InputError` as `forward_greedily` does.
 
-    >>> rates = np.array([2.0, 2.0, 2.0, 2.0])
-    >>> round(forward_by_shares(rates, rates, best_shares(rates, rates)).rate, 6)
-    1.0
+    >>> best_shares(np.array([2.0, 2.0]), np.array([2.0, 2.0])).tolist()
+    [1.0, 0.0]
     """
     _check(I_U, I_G, buffer)
     slots = I_U.tolist(), I_G.tolist()

@@ -92,5 +92,3 @@ def test_arrays_are_read_only_and_cached() -> None:
 def test_what_is_refused() -> None:
     with pytest.raises(InputError, match=r"'psk8'.*8psk"):
         constellation("psk8")
-    with pytest.raises(InputError, match="at least one antenna"):
-        difference_classes("bpsk", 0)

@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.radio.relay import best_shares, forward_by_shares, forward_greedily
+from faao_mav.radio.relay import RelayQueue, best_shares, forward_greedily
 
 BITS = st.integers(0, 64).map(lambda k: k / 16)
 BUFFERS = st.sampled_from([0.5, 1.0, 3.0, math.inf])
@@ -64,8 +64,7 @@ def test_greedy_forwarding_is_the_best_in_full_duplex(
 
 @given(routes(), BUFFERS)
 def test_best_shares_are_those_of_the_program(route: tuple[Real, Real], buffer: float) -> None:
-    shares = best_shares(*route, buffer)
-    relayed = forward_by_shares(*route, shares, buffer)
+    relayed = RelayQueue(half=True, buffer=buffer).relayed(*route, 1.0)
     assert relayed.rate == pytest.approx(most(*route, buffer, half=True), abs=1e-7)
 
 
@@ -73,7 +72,7 @@ def test_a_long_hover_has_rates_that_are_equal_but_for_rounding() -> None:
     n, u, g = 1000, 1.39, 0.63
     noise = 1 + 1e-15 * np.random.default_rng(1).standard_normal((2, n))
     I_U, I_G = u * noise[0], g * noise[1]
-    rate = forward_by_shares(I_U, I_G, best_shares(I_U, I_G)).rate
+    rate = RelayQueue(half=True).relayed(I_U, I_G, 1.0).rate
     assert rate == pytest.approx(u * g / (u + g), abs=1 / n)
 
 
@@ -95,9 +94,7 @@ def test_more_room_never_delivers_less_and_half_duplex_never_more(route: tuple[R
     buffers = (0.5, 1.0, 3.0, math.inf)
     full = [forward_greedily(*route, buffer).rate for buffer in buffers]
     assert full == sorted(full)
-    half = [
-        forward_by_shares(*route, best_shares(*route, buffer), buffer).rate for buffer in buffers
-    ]
+    half = [RelayQueue(True, buffer).relayed(*route, 1.0).rate for buffer in buffers]
     assert all(more >= less - 1e-6 for less, more in itertools.pairwise(half))
     assert all(shared <= own + 1e-9 for shared, own in zip(half, full, strict=True))
 
@@ -125,8 +122,3 @@ def test_what_no_relay_has_is_refused(I_U: Real, I_G: Real, buffer: float) -> No
         forward_greedily(I_U, I_G, buffer)
     with pytest.raises(InputError, match=r"expected"):
         best_shares(I_U, I_G, buffer)
-
-
-def test_shares_are_shares() -> None:
-    with pytest.raises(InputError, match=r"0 to 1"):
-        forward_by_shares(np.ones(2), np.ones(2), np.array([0.5, 1.5]))
