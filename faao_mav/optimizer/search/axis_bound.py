@@ -15,7 +15,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.search.map_bound import RadialRates, at_ends
+from faao_mav.optimizer.search.map_bound import RadialRates, at_ends, best_price
 from faao_mav.optimizer.search.sweep import largest_within
 
 _BEYOND = 40.0
@@ -47,9 +47,6 @@ at 10 dBm, T = 50 s: the bound is 8 % above the plan without parts, 5 % with the
 _BEHIND, _BEFORE = 0.15, 0.55
 """Limits of the parts, beyond and before the axis, over the distance of the end. Measured with the
 same plan: with 0.25 and 0.75 the bound is 0.3 % higher."""
-
-_GOLDEN, _SECTIONS = (5**0.5 - 1) / 2, 9
-"""Golden section of the price, and how often: it is found to 0.01. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +269,7 @@ class AxisBound:
         before = self._since(range(count // 2 + 1), 0, p)
         if count > count // 2 + 1:
             before += self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
-        ends = np.array([at_ends(self.problem, self.rates, one, one) for one in p])
+        ends = np.array([at_ends(self.problem, self.rates, price) for price in p.tolist()])
         through = before + ends[:, None, None]
         return float(through.min(axis=0).max()) / self.problem.kinematics.slots
 
@@ -305,17 +302,5 @@ def axis_bound(
     `rates` are upper bounds on the best rates by distance. With larger `fine` the bound is tighter;
     time grows with its cube. The price is sought in cells of `coarse`.
     """
-    cells = AxisBound(problem, rates, coarse)
-    low, high = 0.0, 1.0
-    # golden section: the bound of one price is convex in it
-    inner = [1 - _GOLDEN, _GOLDEN]
-    values = [cells.bound([price]) for price in inner]
-    for _ in range(_SECTIONS):
-        left = values[0] <= values[1]
-        low, high = (low, inner[1]) if left else (inner[0], high)
-        kept, worth = (inner[0], values[0]) if left else (inner[1], values[1])
-        price = low + high - kept
-        found = cells.bound([price])
-        inner, values = ([price, kept], [found, worth]) if left else ([kept, price], [worth, found])
-    price = inner[int(values[1] < values[0])]
+    price = best_price(AxisBound(problem, rates, coarse).bound)
     return AxisBound(problem, rates, fine, _PARTED).bound([price + apart for apart in _APART])

@@ -1,11 +1,10 @@
-"""Dynamic programming over the map: the best flights through fields of rewards, by position alone.
+"""Cells of the map at instants of a flight, and the best sums over them: by position alone.
 
-The flight is looked at at K instants, a few slots apart, and the map in square cells. What the
-rewards from instant k on are worth to a flight in a cell, U_k, is its reward there and the best
-U_{k+1} of the cells that it can reach at v_max: a maximum filter with a disc, from the end to the
-start. The same from the start on, F_k, says what the best flight through a cell at instant k is
-worth. Acceleration enters through how far the flight comes from its ends, fences by cells that are
-left out.
+What is to be had from an instant on is worth to a flight in a cell its reward there and the best of
+the cells that it can reach at v_max: a maximum filter with a disc, from the end to the start; the
+same from the start on says what the best flight through a cell is worth. Acceleration enters
+through how far the flight comes from its ends, fences by cells that are left out. Cells and steps
+are rounded outwards, so that no flight is missed.
 """
 
 from collections.abc import Iterable
@@ -22,22 +21,24 @@ CORNER = np.sqrt(0.5)
 
 _FENCED_REACH = 4.0
 """Cells that a step reaches beside a fence, about: what is thinner may be passed through. Chosen.
-Fewer make flights faster in a map that is rounded outwards, by a cell for each stage."""
+Fewer make flights faster, by a cell for each stage."""
 
 _THINNEST = 0.02
 """Least width of the map, in its length: stations and ends may lie on one line. Chosen."""
 
+_MOST_INSTANTS = 100
+"""Instants of a flight at most, which limits time and memory. Chosen."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sweep:
+class Cells:
     """Cells of the map at K instants of a flight.
 
     `x` (2, i, j) are the centres of the cells, m, `side` theirs; `blocks` the K runs of slots
     between the first and the last, which are at given places, and `instants` (K,) their mean times,
     s. `alive` (K, i, j) tells where a flight can be at an instant, `free` (i, j) where the fence
-    lets it be. A step from one instant to the next has `stages`, which all end in `free`;
-    `rows` is what one of these reaches: by how many rows to either side, and how many columns to
-    either side there.
+    lets it be. A step from one instant to the next has `stages`, which all end in `free`; `rows`
+    is what one of these reaches: by how many rows to either side, and how many columns there.
     """
 
     x: Real
@@ -50,14 +51,17 @@ class Sweep:
     free: Flags
 
     def backward(self, rewards: Real) -> Real:
-        """Return U (K, ..., i, j): the best sum from each instant on, its own reward included.
+        """Return the best sums (K, ..., i, j) from each instant on, its own reward included.
 
         `rewards` (K, ..., i, j) are those of the instants; -inf where no flight can be.
         """
         out = np.empty_like(rewards)
         out[-1] = rewards[-1]
         for k in range(len(rewards) - 2, -1, -1):
-            out[k] = rewards[k] + self.reached(out[k + 1])
+            after = self._near(out[k + 1])
+            for _ in range(self.stages - 1):
+                after = self._near(np.where(self.free, after, -np.inf))
+            out[k] = rewards[k] + after
         return out
 
     def through(self, rewards: Real) -> Real:
@@ -65,17 +69,6 @@ class Sweep:
         after, before = self.backward(rewards), self.backward(rewards[::-1])[::-1]
         with np.errstate(invalid="ignore"):  # -inf - -inf: nobody comes there
             return np.nan_to_num(after + before - rewards, nan=-np.inf, neginf=-np.inf)
-
-    def reached(self, values: Real) -> Real:
-        """Return the largest of `values` (..., i, j) in reach of one step."""
-        return self._near(self._stages(values)[-1])
-
-    def _stages(self, values: Real) -> list[Real]:
-        """Return the largest of `values` in reach after 0, 1, ... `stages` - 1 stages of a step."""
-        after = [values]
-        for _ in range(self.stages - 1):
-            after.append(np.where(self.free, self._near(after[-1]), -np.inf))
-        return after
 
     def _near(self, values: Real) -> Real:
         """Return the largest of `values` (..., i, j) in reach of one stage."""
@@ -90,28 +83,6 @@ class Sweep:
                 np.maximum(above, near[..., :-rows, :], out=above)
                 np.maximum(below, near[..., rows:, :], out=below)
         return best
-
-    def paths(self, values: Real) -> Integers:
-        """Return the cells (2, B, K) of the best flights from the first instant on.
-
-        `values` (K, B, i, j) is what `backward` returns for each of B fields of rewards.
-        """
-        count, (width, height) = values.shape[1], values.shape[2:]
-        signed = {(s * row, most) for row, most in self.rows for s in (1, -1)}
-        step = np.array([(row, j) for row, most in signed for j in range(-most, most + 1)]).T
-        cells = np.empty((2, count, len(values)), dtype=np.int_)
-        cells[..., 0] = np.divmod(values[0].reshape(count, -1).argmax(axis=-1), height)
-        each = np.arange(count)
-        for k in range(1, len(values)):
-            here = cells[:, :, k - 1]
-            for after in reversed(self._stages(values[k])):
-                i, j = here[..., None] + step[:, None]
-                inside = (i >= 0) & (i < width) & (j >= 0) & (j < height)
-                i, j = np.where(inside, i, 0), np.where(inside, j, 0)
-                best = np.where(inside, after[each[:, None], i, j], -np.inf).argmax(axis=-1)
-                here = np.stack([i[each, best], j[each, best]])
-            cells[:, :, k] = here
-        return cells
 
 
 def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
@@ -140,32 +111,16 @@ def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
     return found
 
 
-def sweep_over(
-    kin: Kinematics,
-    places: Real,
-    *,
-    cells: int,
-    reach: float,
-    most_instants: int,
-    free: FreeArea | None = None,
-    outward: bool = False,
-) -> Sweep:
-    """Return the cells and instants for flights of `kin` between `places` (k, 2), m.
+def cells_of(
+    kin: Kinematics, stations: Real, cells: int, reach: float, free: FreeArea | None = None
+) -> Cells:
+    """Return about so many `cells`, with steps that reach about so many, for flights of `kin`.
 
-    With `outward` no flight is missed: cells and steps are rounded outwards. The map is a box about
-    the ends, all places and obstacles. A flight beyond it has a projection on it that is never
-    farther from a place, keeps the limits used here, and meets no obstacle.
-
-    Args:
-        kin: the feasible set.
-        places: the stations.
-        cells: how many cells the map has at most, about.
-        reach: how many cells one step reaches, about.
-        most_instants: K is at most this.
-        free: where the aircraft may be, everywhere if None.
-        outward: whether no flight may be missed.
+    The map is a box about the ends, the `stations` (k, 2) and obstacles. A flight beyond it has a
+    projection on it that is never farther from a station, keeps the limits used here, and meets no
+    obstacle. `free` is where the aircraft may be, everywhere if None.
     """
-    corners = np.vstack([kin.start, kin.end, places])
+    corners = np.vstack([kin.start, kin.end, stations])
     since, until = kin.longest_ways()
     if free is not None:
         corners = np.vstack([corners, _edges(free, kin, float(since[-1]))])
@@ -173,7 +128,7 @@ def sweep_over(
     extent = np.maximum(high - low, _THINNEST * float((high - low).max()) + 1.0)
     duration = kin.time_step * (kin.slots - 1)
     side = max(
-        float(np.sqrt(extent.prod() / cells)), kin.max_speed * duration / (reach * most_instants)
+        float(np.sqrt(extent.prod() / cells)), kin.max_speed * duration / (reach * _MOST_INSTANTS)
     )
     margin = 0 if free is None else 2  # no obstacle reaches the edge of the map
     axes = [
@@ -184,7 +139,7 @@ def sweep_over(
     t = kin.time_step * np.arange(kin.slots)
     inner = np.arange(1, kin.slots - 1)
     slots = max(1, round(reach * side / (kin.max_speed * kin.time_step)))
-    blocks = np.array_split(inner, max(1, min(len(inner) // slots, most_instants)))
+    blocks = np.array_split(inner, max(1, min(len(inner) // slots, _MOST_INSTANTS)))
     instants = np.array([t[block].mean() for block in blocks])
     alive = np.ones((len(blocks), *x.shape[1:]), dtype=np.bool_)
     for end, ways in ((kin.start, since), (kin.end, until)):
@@ -193,12 +148,17 @@ def sweep_over(
         alive &= np.hypot(*(x - end[:, None, None])) <= way[:, None, None]
     inside = np.ones(x.shape[1:], dtype=np.bool_)
     if free is not None:
-        area = FreeArea(free.shape.buffer(CORNER * side)) if outward else free
+        area = FreeArea(free.shape.buffer(CORNER * side))
         inside = area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
-    step = kin.max_speed * float(np.diff(instants).max(initial=0.0))
     stages = 1 if free is None else max(1, round(reach / _FENCED_REACH))
-    rows = _disc(step / side / stages, outward=outward)
-    return Sweep(x, side, blocks, instants, alive & inside, rows, stages, inside)
+    step = kin.max_speed * float(np.diff(instants).max(initial=0.0)) / side / stages
+    # from any point of one cell to any point of another
+    rows = [
+        (row, int(np.sqrt(step**2 - max(0, row - 1) ** 2)) + 1)
+        for row in range(int(step) + 2)
+        if row - 1 <= step
+    ]
+    return Cells(x, side, blocks, instants, alive & inside, rows, stages, inside)
 
 
 def _edges(free: FreeArea, kin: Kinematics, reach: float) -> Real:
@@ -208,17 +168,3 @@ def _edges(free: FreeArea, kin: Kinematics, reach: float) -> Real:
     rings = shapely.get_coordinates(free.shape)
     inner = rings[np.abs(rings).max(axis=1) < 0.99 * FARTHEST]
     return np.asarray(np.clip(inner, kin.start - reach, kin.start + reach))
-
-
-def _disc(radius: float, *, outward: bool) -> list[tuple[int, int]]:
-    """Return the rows and columns that a disc of `radius` cells reaches, centre to centre.
-
-    With `outward` from any point of one cell to any point of another.
-    """
-    rows = []
-    for row in range(int(radius) + 2):
-        across = max(0, row - 1) if outward else row
-        if across <= radius:
-            along = int(np.sqrt(radius**2 - across**2))
-            rows.append((row, along + 1 if outward else along))
-    return rows
