@@ -1,15 +1,12 @@
 """Starts for an aircraft that cannot hover: feasible flights with ||v|| >= v_min throughout.
 
-A curve flown at one speed c is its headings theta(n); the displacement is c delta_t sum (cos, sin)
-theta(n). Where there is more time than the line from w_I to w_F takes, the curve weaves about the
-line or has full circles on the way, as many as the limits allow, or fewer and wider ones; given end
-velocities turn its ends. Such a curve meets w_F but for what its ends add. Where none of them keeps
-every limit, `turning_curves` are tried too, then the interior-point method finds the flight nearest
-to one of them all that does.
+Of `turning_curves` at several speeds the first that keeps every limit is taken; where none does,
+the interior-point method finds the flight nearest to one of them that does. Flights by way of
+stations circle there for what time is left.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import chain, product
+from itertools import product
 
 import numpy as np
 
@@ -22,20 +19,11 @@ from faao_mav.optimizer.search.turning import turning_curves
 _TURN_SHARE = 0.95
 """Share of the largest acceleration that turns use; the rest is for meeting the ends. Chosen."""
 
-_WIDEST = 2.404825557695773
-"""Amplitude of a weave of no displacement, radians: the first zero of J_0."""
-
-_WEAVES = (16, 8, 4, 2, 1)
-"""Numbers of waves that are tried. Chosen: many stay close to the line."""
-
 _SPEEDS = (1.3, 1.1, 1.02)
 """Speeds c that are tried, in v_min; above 1 there is room. Chosen."""
 
 _TOLERANCE = 1e-9
 """Violation of a limit, in its SI unit, and length in metres that count as none: rounding."""
-
-_BISECTIONS = 40
-"""Bisections of an amplitude, which is then known to 1e-12 radians."""
 
 _REPAIRS = 12
 """Curves at most that are brought within the limits, the least violation first. Chosen."""
@@ -54,8 +42,7 @@ def cruise(kin: Kinematics) -> Trajectory:
     Raises:
         InfeasibleError: none was found, which is no proof that there is none.
     """
-    turning = (v for c in _speeds(kin) for v in turning_curves(kin, c))
-    flight = _first_flight(kin, chain(_curves(kin), turning))
+    flight = _first_flight(kin, (v for c in _speeds(kin) for v in turning_curves(kin, c)))
     if flight is None:
         turns = f", turns of {np.degrees(kin.most_turn):.3g} degrees a second (its guidance's)"
         raise InfeasibleError(
@@ -104,68 +91,17 @@ def _speeds(kin: Kinematics) -> list[float]:
     return list(dict.fromkeys(c for c in tried if c <= kin.max_speed))
 
 
-def _curves(kin: Kinematics) -> Iterator[Real]:
-    """Yield velocities (n, 2) along weaves and circles from w_I to w_F."""
-    goal, steps = kin.end - kin.start, kin.slots - 1
-    distance = float(np.hypot(*goal))
-    time = np.linspace(0.0, 1.0, kin.slots)
-    given = [v for v in (kin.start_velocity, kin.end_velocity) if v is not None]
-    ahead = goal if distance > _TOLERANCE else (given or [np.array([1.0, 0.0])])[0]
-    heading = float(np.arctan2(ahead[1], ahead[0]))
-    sides = [(0.0,) if v is None else (0.0, 1.0, -1.0) for v in _ends(kin)]
-    around = sorted(product(*sides), key=lambda pair: abs(pair[0]) + abs(pair[1]))
-    for extra, c in product(around, _speeds(kin)):
-        share = distance / (c * kin.time_step * steps)
-        if share > 1:
-            continue
-        turn = c / (_TURN_SHARE * kin.turning(c))  # seconds per radian
-        most = int((1 - share) * kin.time_step * steps / (2 * np.pi * turn))
-        circles = sorted({min(1, most), most} - {0})
-        for theta in (
-            *(_weave(time, waves, share) for waves in _WEAVES),
-            *(_circle(time, side * k, share) for k in circles for side in (1, -1)),
-        ):
-            yield _with_ends(kin, heading + theta, c, extra)
-
-
-def _ends(kin: Kinematics) -> tuple[Real | None, Real | None]:
-    return kin.start_velocity, kin.end_velocity
-
-
-def _weave(time: Real, waves: int, share: float) -> Real:
-    """Return headings (n,) that swing about 0 `waves` times; `share` is the displacement's."""
-    phase = np.sin(2 * np.pi * waves * time)
-    low, high = 0.0, _WIDEST
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        along = np.cos(middle * phase)
-        low, high = (middle, high) if (along[1:] + along[:-1]).mean() / 2 > share else (low, middle)
-    return np.asarray(high * phase)
-
-
-def _circle(time: Real, circles: int, share: float) -> Real:
-    """Return headings (n,) of 0 with full `circles` half way, left if positive."""
-    return np.asarray(
-        2 * np.pi * circles * np.clip((time - share / 2) / max(1 - share, _TOLERANCE), 0, 1)
-    )
-
-
-def _with_ends(
-    kin: Kinematics, theta: Real, c: float, extra: tuple[float, ...] = (0.0, 0.0)
-) -> Real:
-    """Return velocities (n, 2) at speed c along headings `theta` (n,), turned to the given ends.
-
-    `extra` are full circles by which the turns at both ends are longer than they must be.
-    """
+def _with_ends(kin: Kinematics, theta: Real, c: float) -> Real:
+    """Return velocities (n, 2) at speed c along headings `theta` (n,), turned to the given ends."""
     time = kin.time_step * np.arange(kin.slots)
     speed = np.full(kin.slots, c)
     theta = theta.copy()
-    for v, at, since, more in zip(_ends(kin), (0, -1), (time, time[::-1]), extra, strict=True):
+    ends = (kin.start_velocity, 0, time), (kin.end_velocity, -1, time[::-1])
+    for v, at, since in ends:
         if v is None:
             continue
         size = float(np.hypot(*v))
-        angle = float(np.arctan2(v[1], v[0])) - theta[at]
-        angle = (angle + np.pi) % (2 * np.pi) - np.pi + 2 * np.pi * more
+        angle = (float(np.arctan2(v[1], v[0])) - theta[at] + np.pi) % (2 * np.pi) - np.pi
         # turning and changing speed share the limit: the sum of their squares stays below its own
         change = np.hypot(angle * max(size, c), size - c) / kin.turning(min(size, c))
         rising = (c > size) == (at == 0)
@@ -174,7 +110,7 @@ def _with_ends(
         theta += angle * left
         speed += (size - c) * left
     v = speed[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    for velocity, at in zip(_ends(kin), (0, -1), strict=True):
+    for velocity, at, _ in ends:
         if velocity is not None:
             v[at] = velocity  # free of rounding
     return np.asarray(v)
