@@ -15,7 +15,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.optimizer.search.bound import upper_bound
-from faao_mav.optimizer.search.starts import fewest_slots, starts, straight_flight
+from faao_mav.optimizer.search.starts import even_speed, starts, straight_flight
 from faao_mav.optimizer.search.track import Closeness
 from faao_mav.plan import Wind
 from missions import plan_of
@@ -49,7 +49,7 @@ def test_starts_keep_the_limits_or_there_is_none(
         flights = starts(kin, ["straight", "bs", "user-bs"], STATIONS)
     except InfeasibleError:
         distance = float(np.hypot(*kin.end))
-        assert fewest_slots(kin, kin.end / distance, distance) is None
+        assert even_speed(kin, kin.end / distance, distance) is None
     else:
         for flight in flights.values():
             assert max(kin.residuals(flight).values()) < 1e-7

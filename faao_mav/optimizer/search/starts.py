@@ -1,7 +1,9 @@
 """The feasible flights that the search starts from: straight, and by way of the stations."""
 
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -9,6 +11,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.cruise import cruise, cruise_by
+from faao_mav.optimizer.search.track import nearest_flight
 
 BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
 """What `global` stands for: paths found over the map gained nothing beside these (44 random plans,
@@ -69,8 +72,8 @@ def starts(
 def straight_flight(kin: Kinematics) -> Trajectory:
     """Return a feasible flight along the line from w_I to w_F, at the most even speed.
 
-    Where end velocities do not lie on that line, it is the flight of least sum ||a||²; where the
-    line is too short for the least speed, one with detours (see `cruise`).
+    Where end velocities do not lie on that line, it is the nearest flight to it; where the line is
+    too short for the least speed, one with detours (see `cruise`).
 
     Raises:
         InfeasibleError: there is no feasible flight, or none was found that keeps the least speed.
@@ -88,7 +91,7 @@ def straight_flight(kin: Kinematics) -> Trajectory:
             flight = kin.follow(speed[:, None] * direction)
             if kin.residuals(flight).get("turn", 0.0) < 1e-9:
                 return flight
-    return cruise(kin) if kin.min_speed > 0 else _gentlest_flight(kin)
+    return cruise(kin) if kin.min_speed > 0 else _flight_aside(kin)
 
 
 def _circling_by(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
@@ -127,42 +130,6 @@ def even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | None
     return np.asarray(np.clip(np.interp(distance, flown, speeds), lower, upper))
 
 
-def fewest_slots(kin: Kinematics, direction: Real, distance: float) -> int | None:
-    """Return the least number of slots in which a straight flight covers `distance` metres.
-
-    None if `kin` has fewer. The quickest flight speeds up as long as it can and then slows down:
-    its distance in 2, 3, ... slots follows from the cumulative sums of both.
-    """
-    after = np.arange(kin.slots)
-    slots = after[1:] + 1
-    gain = kin.max_acceleration * kin.time_step
-    most = kin.speeds_along(direction)[1]
-    rising, falling = np.full((2, kin.slots), most)
-    split, possible = np.zeros_like(slots), np.ones(slots.shape, dtype=bool)
-    if kin.end_velocity is not None:
-        last = float(kin.end_velocity @ direction)
-        falling = np.minimum(most, last + gain * after)
-    if kin.start_velocity is not None:
-        first = float(kin.start_velocity @ direction)
-        if kin.bound_first_acceleration:
-            rising = np.minimum(most, first + gain * after)
-        rising[0] = first
-        if kin.end_velocity is None:
-            split = slots
-        elif kin.bound_first_acceleration:
-            split = np.floor(((slots - 1) + (last - first) / gain) / 2).astype(int) + 1
-        else:
-            split = (first <= falling[slots - 1]).astype(int)
-        if kin.end_velocity is not None:
-            possible = abs(first - last) <= gain * (slots - 1) + 1e-12
-    split = np.clip(split, 0, slots)
-    up, down = (np.concatenate([[0.0], np.cumsum(speed)]) for speed in (rising, falling))
-    ends = np.minimum(rising[0], falling[slots - 1]) + np.minimum(rising[slots - 1], falling[0])
-    covered = kin.time_step * (up[split] + down[slots - split] - ends / 2)
-    enough = np.flatnonzero(possible & (covered >= distance))
-    return int(slots[enough[0]]) if enough.size else None
-
-
 def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:
     """Return the least and the greatest speed (N + 2,) that the ends and the limits allow, m/s."""
     n = np.arange(kin.slots, dtype=float)
@@ -186,54 +153,44 @@ def _distance(kin: Kinematics, speed: Real) -> float:
     return float(kin.time_step * (speed[:-1] + speed[1:]).sum() / 2)
 
 
-def _gentlest_flight(kin: Kinematics) -> Trajectory:
-    """Return the feasible flight of least sum ||a||², a convex problem for Clarabel."""
-    import cvxpy as cp
-
-    from faao_mav.optimizer.scaled import flight_variables, solve
-
-    flight = flight_variables(kin)
-    problem = cp.Problem(cp.Minimize(cp.sum_squares(flight.a)), flight.constraints)
-    if solve(problem) == cp.INFEASIBLE:
+def _flight_aside(kin: Kinematics) -> Trajectory:
+    """Return the feasible flight nearest to an even one, for end velocities across the line."""
+    share = np.linspace(0, 1, kin.slots)[:, None]
+    even = kin.start + share * (kin.end - kin.start)
+    ends = (
+        np.zeros(2) if velocity is None else velocity
+        for velocity in (kin.start_velocity, kin.end_velocity)
+    )
+    first, last = ends
+    flight = nearest_flight(kin, even, kin.follow((1 - share) * first + share * last))
+    if flight is None:
         air = f"{kin.max_airspeed:.4g} m/s through the air, " if any(kin.wind) else ""
         raise InfeasibleError(
             "no flight from start to end meets the end velocities within the duration, "
             f"{air}{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2; "
             "give more time or gentler end velocities"
         )
-    return flight.trajectory()
+    return flight
 
 
 def _by_way_of(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
     """Return the flight that goes the largest possible share of the way to `stations`."""
     anchors = [_nearest_on_line(kin.start, kin.end, p) for p in stations]
 
-    def attempt(share: float) -> list[_StraightPart] | None:
-        stops = [a + share * (p - a) for a, p in zip(anchors, stations, strict=True)]
-        return _parts(kin, stops)
+    def attempt(share: float) -> Trajectory | None:
+        return with_stops(
+            kin, [a + share * (p - a) for a, p in zip(anchors, stations, strict=True)]
+        )
 
     best = attempt(1.0)
-    if best is not None:
-        return _joined(kin, best)
-    if attempt(_LEAST_SHARE) is None:
-        return None
+    if best is not None or attempt(_LEAST_SHARE) is None:
+        return best
     low, high = 0.0, 1.0
     for _ in range(_BISECTIONS):
         middle = (low + high) / 2
-        parts = attempt(middle)
-        if parts is None:
-            high = middle
-        else:
-            low, best = middle, parts
-    return None if best is None else _joined(kin, best)
-
-
-def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
-    """Return the flight that stops at `stops`, straight between them; None if the time is short."""
-    if not stops:
-        return straight_flight(kin)
-    parts = _parts(kin, stops)
-    return None if parts is None else _joined(kin, parts)
+        flight = attempt(middle)
+        low, high, best = (low, middle, best) if flight is None else (middle, high, flight)
+    return best
 
 
 def _nearest_on_line(a: Real, b: Real, p: Real) -> Real:
@@ -244,51 +201,49 @@ def _nearest_on_line(a: Real, b: Real, p: Real) -> Real:
     return np.asarray(a + share * line)
 
 
-@dataclass(frozen=True, slots=True)
-class _StraightPart:
-    """A straight flight of `distance` metres along `direction`, in the fewest slots it takes."""
+def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
+    """Return the flight that stops at `stops`, straight between them; None if the time is short.
 
-    kin: Kinematics
-    direction: Real
-    distance: float
-
-
-def _parts(kin: Kinematics, stops: list[Real]) -> list[_StraightPart] | None:
-    """Return the flights from stop to stop, each as fast as allowed; None if the time is short."""
-    points = [kin.start, *stops, kin.end]
-    parts, spare = [], kin.slots - 1
-    for k in range(len(points) - 1):
-        first, last = k == 0, k == len(points) - 2
-        own = replace(
-            kin,
-            start=points[k],
-            end=points[k + 1],
-            start_velocity=kin.start_velocity if first else np.zeros(2),
-            end_velocity=kin.end_velocity if last else np.zeros(2),
-            bound_first_acceleration=kin.bound_first_acceleration or not first,
+    Between stops it is as quick as it can be, and hovers at each for an even part of the rest.
+    """
+    if not stops:
+        return straight_flight(kin)
+    legs, spare = list[Real](), kin.slots - 1
+    for k, (a, b) in enumerate(pairwise([kin.start, *stops, kin.end])):
+        first, last = k == 0, k == len(stops)
+        leg = _quickest(
+            replace(
+                kin,
+                start=a,
+                end=b,
+                slots=spare + 1,
+                start_velocity=kin.start_velocity if first else np.zeros(2),
+                end_velocity=kin.end_velocity if last else np.zeros(2),
+                bound_first_acceleration=kin.bound_first_acceleration or not first,
+            )
         )
-        line = own.end - own.start
-        distance = float(np.hypot(*line))
-        direction = line / distance if distance else _EAST
-        slots = fewest_slots(own, direction, distance)
-        if _leads_aside(own, direction) or slots is None or slots - 1 > spare:
+        if leg is None:
             return None
-        spare -= slots - 1
-        parts.append(_StraightPart(replace(own, slots=slots), direction, distance))
-    return parts
+        spare -= len(leg) - 1
+        legs.append(leg)
+    for k in range(len(stops)):
+        hover = spare // len(stops) + (k < spare % len(stops))
+        legs[k + 1] = np.vstack([np.zeros((hover, 2)), legs[k + 1][1:]])
+    return kin.follow(np.vstack(legs))
 
 
-def _joined(kin: Kinematics, parts: list[_StraightPart]) -> Trajectory | None:
-    """Return the flight along `parts`, with equal hovers between them for what time is left."""
-    velocities = []
-    for part in parts:
-        speed = even_speed(part.kin, part.direction, part.distance)
-        if speed is None:
-            return None
-        velocities.append(speed[:, None] * part.direction)
-    stops = len(parts) - 1
-    spare = kin.slots - 1 - sum(len(v) - 1 for v in velocities)
-    for k in range(stops):
-        hover = spare // stops + (k < spare % stops)
-        velocities[k + 1] = np.vstack([np.zeros((hover, 2)), velocities[k + 1][1:]])
-    return kin.follow(np.vstack(velocities))
+def _quickest(kin: Kinematics) -> Real | None:
+    """Return the velocities (n, 2) of a straight flight in the fewest slots; None past those of kin."""
+    line = kin.end - kin.start
+    distance = float(np.hypot(*line))
+    direction = line / distance if distance else _EAST
+    if _leads_aside(kin, direction):
+        return None
+
+    def speed_in(slots: int) -> Real | None:
+        return even_speed(replace(kin, slots=slots), direction, distance)
+
+    counts = range(2, kin.slots + 1)
+    found = bisect_left(counts, True, key=lambda slots: speed_in(slots) is not None)
+    speed = speed_in(counts[found]) if found < len(counts) else None
+    return None if speed is None else speed[:, None] * direction
