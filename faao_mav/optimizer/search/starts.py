@@ -233,7 +233,7 @@ def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
 
 
 def _quickest(kin: Kinematics) -> Real | None:
-    """Return the velocities (n, 2) of a straight flight in the fewest slots; None past those of kin."""
+    """Return the velocities (n, 2) of a straight flight in the fewest slots, or None."""
     line = kin.end - kin.start
     distance = float(np.hypot(*line))
     direction = line / distance if distance else _EAST
