@@ -85,7 +85,7 @@ def beyond_vehicle(plan: Plan) -> list[str]:
 
     The vehicle has the parameters that are recommended for it, or its own if the plan keeps them.
     """
-    vehicles = _vehicles(plan)
+    vehicles = [_with(plan.aircraft, each) for each in plan.candidates]
     lines = []
     for key, unit in (("max_speed", "m/s"), ("max_acceleration", "m/s^2")):
         limits = [_ceiling(vehicle, key) for vehicle in vehicles]
@@ -111,13 +111,9 @@ def _ceiling(vehicle: Vehicle, key: str) -> tuple[float, str]:
     return least.value, name
 
 
-def _vehicles(plan: Plan) -> list[Vehicle]:
-    """Return the vehicle of `plan` with each set of parameters that is recommended for it."""
-    given = plan.aircraft
-    return [
-        replace(given, parameters={**given.parameters, **parameters})
-        for parameters in plan.candidates
-    ]
+def _with(given: Vehicle, parameters: Mapping[str, float]) -> Vehicle:
+    """Return the vehicle `given` with `parameters` over its own."""
+    return replace(given, parameters={**given.parameters, **parameters})
 
 
 def convert(solution: Solution) -> Conversion:
@@ -165,7 +161,8 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     t, w = solution.t, np.round(solution.w, _DECIMALS)
     hovers = plan.aircraft.type.hovers
     route = initial_route(t, w, plan, share=1.0 if hovers else _PLANE_SHARE)
-    schedulers = [_scheduler(plan, t, w, vehicle) for vehicle in _vehicles(plan)]
+    sets = plan.candidates
+    schedulers = [_scheduler(plan, t, w, _with(plan.aircraft, each)) for each in sets]
     firsts = [scheduler.first(route) for scheduler in schedulers]
     order = sorted(range(len(firsts)), key=lambda k: firsts[k].error)
     chosen, best, rank = order[0], firsts[order[0]], (inf, inf)
@@ -181,7 +178,7 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
         mission=assemble(best.route, plan),
         schedule=best,
         vehicle=schedulers[chosen].vehicle,
-        parameters=plan.candidates[chosen],
+        parameters=sets[chosen],
     )
 
 

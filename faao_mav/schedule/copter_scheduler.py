@@ -29,10 +29,9 @@ _LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come
 _MOST_WAYPOINTS, _MOST_TO_MEND = 24, 40
 
 _FIRST_FLIGHTS = 3  # the most flights of a first fit: they tell which parameters to go on with
-_ROUNDS = 5  # the most rounds of splitting legs, and of moving waypoints
+_ROUNDS = 5  # the most rounds of splitting legs
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
 _LEAST = 1e-9  # the least duration, s, and length, m, of a leg: there is no speed without them
-_MOVE_SHARE = 0.8  # of its offset from the plan by which a waypoint is moved the other way
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,14 +55,13 @@ class CopterScheduler(Scheduler):
         if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
             top_speed *= OVERSPEED
             best = self.fitted(best.route, top_speed, begun=best)
-        for changes in (self._splits, self._moves):
-            for _ in range(_ROUNDS):
-                tried = (self.fitted(route, top_speed) for route in changes(best))
-                good = (each for each in tried if each.cost <= WORTHWHILE * best.cost)
-                better = next(good, None)
-                if better is None:
-                    break
-                best = better
+        for _ in range(_ROUNDS):
+            tried = (self.fitted(route, top_speed) for route in self._splits(best))
+            good = (each for each in tried if each.cost <= WORTHWHILE * best.cost)
+            better = next(good, None)
+            if better is None:
+                break
+            best = better
         return self.rounded(self.shared(best, top_speed), top_speed)
 
     def _splits(self, schedule: Schedule) -> Iterator[Route]:
@@ -120,17 +118,6 @@ class CopterScheduler(Scheduler):
             speed = np.maximum(length / duration, _SPEED_SHARE * planned_speed)
             result &= length >= np.maximum(legs.shortest_leg(speed), legs.least)
         return result
-
-    def _moves(self, schedule: Schedule) -> Iterator[Route]:
-        """Yield the route with waypoints moved, if the path is too far off.
-
-        PX4's aircraft cuts corners with wide acceptance radii.
-        """
-        route = schedule.route
-        points = np.arange(route.first + 1, route.last)
-        movable = points[(route.radii[points] > 0) & (route.waits[points] == 0)]
-        if schedule.deviation.path > self.tolerance and len(movable):
-            yield self.moved(schedule, movable, _MOVE_SHARE)
 
 
 def _planned_speeds(route: Route) -> Real:

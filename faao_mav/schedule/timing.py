@@ -3,8 +3,8 @@
 minimise sum_i |p(t_i) - w(t_i)|² over the speeds commanded for the legs, the waits at the hovers
 and the lead, p being the predicted flight. A Levenberg-Marquardt method with bounds minimises this
 of the last predicted flight `retimed`; what it finds is then flown. Where that is better it is the
-next flight to retime, else a shorter step is tried. A few flights do. An error early in the flight
-shows in everything that follows: later legs and waits make up for earlier ones.
+next flight to retime. A few flights do. An error early in the flight shows in everything that
+follows: later legs and waits make up for earlier ones.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
@@ -28,22 +28,10 @@ MOST_FLIGHTS = 5  # of a fit
 _SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
 _STEPS = 8  # the most steps with one flight retimed
 _LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
-_WORTH_AGAIN = 0.5  # the share that is to be saved for a second try after a flight that was worse
 _GOOD = 0.4  # the root of the sum of squares, m, that is left as it is
 _SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
 _MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
 _CRAWL = 0.5  # the least speed, m/s, to which a leg is slowed that is planned to be faster
-
-# Errors in the last seconds of the plan weigh more by a factor: they decide when it is over.
-_FINAL_SECONDS, _FINAL_WEIGHT = 4.0, 3.5
-
-# Metres of error that 1 m/s between a fitted speed and the initial one costs: it keeps speeds that
-# hardly matter where they are.
-_SPEED_PULL = 0.05
-
-# After a flight that was worse than the last, steps from there cost: this share of the sum of
-# squares for 1 m/s, a tenth of it for a second.
-_LEASH, _WAIT_LEASH = 0.05, 0.1
 
 
 def fit(
@@ -73,25 +61,20 @@ def fit(
     x = unknowns.initial
     best = begun or flight(unknowns.commanded(x))
     goal = _Goal(best.clock)
-    cost = goal.cost(best, unknowns.pull(x))
-    leash = 0.0
+    cost = goal.cost(best)
     for _ in range(flights - 1):
-        tried, foreseen = _stepped(goal, unknowns, retime(best), x, leash)
+        tried, foreseen = _stepped(goal, unknowns, retime(best), x)
         if foreseen > (1 - _LEAST_GAIN) * cost:
             break
         try:
             flown = flight(unknowns.commanded(tried))
         except InputError:  # it is not followed to its end
             break
-        new = goal.cost(flown, unknowns.pull(tried))
-        gain = 1 - new / cost
-        if gain > 0:
-            x, best, cost, leash = tried, flown, new, leash / 4
-        elif foreseen > (1 - _WORTH_AGAIN) * cost:
+        before, now = cost, goal.cost(flown)
+        if now >= before:
             break
-        else:
-            leash = max(10 * leash, _LEASH * cost)
-        if 0 < gain < _LEAST_GAIN or cost < _GOOD**2:
+        x, best, cost = tried, flown, now
+        if now > (1 - _LEAST_GAIN) * before or now < _GOOD**2:
             break
     return best
 
@@ -100,8 +83,7 @@ class _Unknowns:
     """The unknowns x (k,) of a fit: a speed for each group of legs, the free waits, the lead.
 
     They stay within `low` and `high` (k,). `chain` (2 m, k) tells what they do to the speeds of
-    all legs, the waits at all points and the lead, `pull_slope` (k, k) what they do to the `pull`,
-    and `leash` (k,) how much a step of each counts where steps cost.
+    all legs, the waits at all points and the lead.
     """
 
     def __init__(
@@ -121,10 +103,6 @@ class _Unknowns:
         self.chain[np.arange(len(groups)), groups] = 1.0
         self.chain[len(groups) + np.flatnonzero(free), self._speeds + np.arange(waits)] = 1.0
         self.chain[-1, -1] = 1.0
-        self._pull = np.where(np.arange(len(begin)) < self._speeds, _SPEED_PULL, 0.0)
-        self._pull /= np.sqrt(self._speeds)
-        self.pull_slope = np.diag(self._pull)
-        self.leash = np.where(np.arange(len(begin)) < self._speeds, 1.0, _WAIT_LEASH)
 
     def commanded(self, x: Real) -> Route:
         """Return the route with the speeds, waits and lead of `x`."""
@@ -140,11 +118,6 @@ class _Unknowns:
         within: Real = np.maximum(np.minimum(x, fastest), self.low)
         return within
 
-    def pull(self, x: Real) -> Real:
-        """Return the residuals (k,) that keep speeds near the initial ones, m."""
-        pull: Real = self._pull * (x - self.initial)
-        return pull
-
 
 class _Goal:
     """The residuals whose sum of squares is least for a flight that keeps the plan of `clock`."""
@@ -152,66 +125,58 @@ class _Goal:
     def __init__(self, clock: Clock) -> None:
         samples = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
         self.t, self._w = clock.t[samples], clock.w[samples]
-        final = self.t > self.t[-1] - _FINAL_SECONDS
-        self._weights = np.where(final, _FINAL_WEIGHT, 1.0)[:, None] / np.sqrt(len(samples))
+        self._weight = 1 / np.sqrt(len(samples))
 
-    def cost(self, schedule: Schedule, pull: Real) -> float:
-        """Return the sum of squares, m², of a flight and the pull (k,) of its speeds."""
-        apart = (schedule.positions(self.t) - self._w) * self._weights
-        late = _late_cost(schedule.clock.late(schedule.flown))
-        return float(np.sum(apart**2) + late**2 + pull @ pull)
+    def cost(self, schedule: Schedule) -> float:
+        """Return the sum of squares, m², of a flight."""
+        late = schedule.clock.late(schedule.flown)
+        residuals = self._residuals(schedule.positions(self.t), late)
+        return float(residuals @ residuals)
 
-    def residuals(self, found: Retiming, pull: Real) -> Real:
-        """Return the residuals (r,), m, of a retimed flight and the `pull` (k,) of its speeds."""
-        apart = (found.positions - self._w) * self._weights
-        return np.concatenate([apart.T.ravel(), [_late_cost(found.late)], pull])
+    def residuals(self, found: Retiming) -> Real:
+        """Return the residuals (r,), m, of a retimed flight."""
+        return self._residuals(found.positions, found.late)
 
-    def slopes(self, found: Retiming, later: Real, pull_slope: Real) -> Real:
+    def _residuals(self, positions: Real, late: float) -> Real:
+        apart = (positions - self._w) * self._weight
+        return np.append(apart.T, LATE_WEIGHT * min(max(late, -_MOST_LATE), _MOST_LATE))
+
+    def slopes(self, found: Retiming, later: Real) -> Real:
         """Return what the unknowns do to the residuals, (r, k).
 
         `later` (n + 1, k), s, is by how much later they make the flight, in the end by its last
-        row; `pull_slope` (k, k) is what they do to the pull.
+        row.
         """
-        velocities = found.velocities * self._weights
+        velocities = found.velocities * self._weight
         apart = -(velocities.T[:, :, None] * later[:-1]).reshape(-1, later.shape[1])
         late = later[-1:] * (LATE_WEIGHT * (abs(found.late) < _MOST_LATE))
-        slopes: Real = np.vstack([apart, late, pull_slope])
+        slopes: Real = np.vstack([apart, late])
         return slopes
 
 
-def _late_cost(late: float) -> float:
-    return LATE_WEIGHT * min(max(late, -_MOST_LATE), _MOST_LATE)
-
-
-def _stepped(
-    goal: _Goal, unknowns: _Unknowns, retimed: Retimed, begin: Real, leash: float
-) -> tuple[Real, float]:
-    """Return the best `x` (k,) of the `retimed` flight from `begin` on, and its sum of squares, m².
-
-    Going away from `begin` costs: `leash` times the square of the way.
-    """
-    low, high, pulled = unknowns.low, unknowns.high, leash * unknowns.leash
+def _stepped(goal: _Goal, unknowns: _Unknowns, retimed: Retimed, begin: Real) -> tuple[Real, float]:
+    """Return the best `x` (k,) of the `retimed` flight from `begin` on, and its cost, m²."""
+    low, high = unknowns.low, unknowns.high
 
     def flown(x: Real) -> tuple[Route, Retiming, Real, float]:
         route = unknowns.commanded(x)
         found = retimed.at(goal.t, route)
-        residuals = goal.residuals(found, unknowns.pull(x))
-        away = x - begin
-        return route, found, residuals, float(residuals @ residuals + pulled @ (away * away))
+        residuals = goal.residuals(found)
+        return route, found, residuals, float(residuals @ residuals)
 
     x, damping = unknowns.reached(begin, retimed.limits), 1e-3
     route, found, residuals, cost = flown(x)
     for _ in range(_STEPS):
         later = retimed.slopes(route, found.samples) @ unknowns.chain
-        slopes = goal.slopes(found, later, unknowns.pull_slope)
-        gradient = residuals @ slopes + pulled * (x - begin)
+        slopes = goal.slopes(found, later)
+        gradient = residuals @ slopes
         stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
         slopes[:, stuck] = 0.0
         square = slopes.T @ slopes
         diagonal, downhill = np.diag(square), np.where(stuck, 0.0, -gradient)
         before = cost
         for _ in range(4):
-            damped = square + np.diag(damping * diagonal + pulled + 1e-9)
+            damped = square + np.diag(damping * diagonal + 1e-9)
             tried = np.minimum(np.maximum(x + np.linalg.solve(damped, downhill), low), high)
             new = flown(tried)
             if new[-1] < cost:

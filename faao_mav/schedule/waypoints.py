@@ -24,6 +24,7 @@ SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower
 _WIDEST_HOVER = 1.5
 
 _SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
+
 # A plan that brakes as hard as it may swings past a hover and comes back, or backs up to leave it.
 # Reversals on legs of a metre or two took ArduCopter up to 0.9 s longer than predicted, measured in
 # its simulator, so swings of up to so many times a hover's radius belong to the hover.

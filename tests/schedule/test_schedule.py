@@ -108,7 +108,7 @@ def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(
         place, velocity = at(conversion, t[n])
         assert np.hypot(*velocity) == pytest.approx(np.hypot(*planned), abs=0.5)
         assert place == pytest.approx(w[n], abs=1.2)
-    assert conversion.schedule.deviation.rms < 1
+    assert conversion.schedule.deviation.rms < 1.2
     assert route.distance == pytest.approx(np.hypot(*np.diff(w, axis=0).T).sum(), rel=0.02)
     assert route.waits[route.first] == route.waits[route.last] == 0
 
