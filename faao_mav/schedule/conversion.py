@@ -18,7 +18,7 @@ from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.initial_route import initial_route, slowest_leg
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.schedule import Schedule
-from faao_mav.schedule.scheduler import GOOD_COST, WORTHWHILE, Scheduler
+from faao_mav.schedule.scheduler import GOOD_COST, Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 
@@ -152,9 +152,8 @@ def _outside(schedule: Schedule, area: FreeArea | None) -> float:
 def _convert(solution: Solution, plan: Plan) -> Conversion:
     """Return the mission for `solution` within the path tolerance of `plan`.
 
-    The sets of parameters that are recommended for the vehicle are compared by the error of the
-    first schedule, and refined in that order until one is good, or hardly better than the best
-    before.
+    The sets of parameters that are recommended for the vehicle are refined in the order of their
+    first schedules' errors until one is good; the best is taken.
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
@@ -169,10 +168,9 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     for k in order:
         tried = schedulers[k].refined(firsts[k])
         new = _outside(tried, plan.keep_in), tried.cost  # inside the fence first
-        worthwhile = new <= (rank[0], WORTHWHILE * rank[1])
         if new < rank:
             chosen, best, rank = k, tried, new
-        if not worthwhile or rank <= (0.0, GOOD_COST):
+        if rank <= (0.0, GOOD_COST):
             break
     return Conversion(
         mission=assemble(best.route, plan),
