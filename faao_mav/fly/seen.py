@@ -11,7 +11,7 @@ from faao_mav.mission.item import Home, Mission
 from faao_mav.wire.machine import Machine, ask_for
 from faao_mav.wire.messages import HomePosition, WireItem
 from faao_mav.wire.parameters import Names, Reading, ReadParameters
-from faao_mav.wire.protocol import HOME_POSITION, MavResult, MissionType
+from faao_mav.wire.protocol import HOME_POSITION, MissionType
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import download_lists
@@ -22,9 +22,6 @@ from faao_mav.wire.wire_items import home_items, mission_of
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
     from faao_mav.schedule.conversion import Conversion
-
-_HAS_NONE = (MavResult.UNSUPPORTED, MavResult.INVALID)
-"""What a vehicle answers that has no such list at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,12 +87,7 @@ def read_held(
         home = home_in(told[0]) if told else None
     except InputError:
         home = None
-    missing = {
-        part: outcome
-        for part, outcome in lists.missing.items()
-        if part is MissionType.MISSION or outcome.result not in _HAS_NONE
-    }
-    return Held(lists.items, reading, missing, home)
+    return Held(lists.items, reading, lists.missing, home)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

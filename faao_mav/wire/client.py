@@ -22,7 +22,6 @@ from faao_mav.wire.protocol import (
     HOME_POSITION,
     POSITION,
     Address,
-    MavResult,
     MissionType,
     meaning,
 )
@@ -30,6 +29,7 @@ from faao_mav.wire.signing import Verdict, read_signing, remember
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import (
+    ABSENT,
     PartReport,
     clear_lists,
     download_lists,
@@ -42,9 +42,6 @@ from faao_mav.wire.whereabouts import Whereabouts, home_in, place_in
 from faao_mav.wire.wire_items import mission_of, wire_items
 
 T = TypeVar("T")
-
-_ABSENT = (MavResult.UNSUPPORTED, MavResult.INVALID)
-"""What a vehicle answers that has no such list at all."""
 
 _PASSED_OVER: dict[Verdict, str] = {
     "forged": "packets come that are signed with another key than the one in {key}",
@@ -151,7 +148,7 @@ def upload(
         if clear_rest and all(each.verified for each in reports):
             rest = [part for part, items in lists.items() if not items]
             cleared = yield from clear_lists(rest, peer, timeouts)
-            reports += tuple(each for each in cleared if each.result not in _ABSENT)
+            reports += tuple(each for each in cleared if each.result not in ABSENT)
         return UploadReport(session.found, reports, 0.0, (), stands, changes)
 
     return _change(connection, mission, allow_armed, job, options)
@@ -238,11 +235,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     with Session(connection, options, knocks=True) as session:
         peer = session.peer
         lists = session.run(Script(download_lists(tuple(MissionType), peer, session.timeouts)))
-        missing = {
-            part: session.not_read(part, outcome)
-            for part, outcome in lists.missing.items()
-            if part is MissionType.MISSION or outcome.result not in _ABSENT
-        }
+        missing = {part: session.not_read(part, why) for part, why in lists.missing.items()}
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
         try:

@@ -28,6 +28,10 @@ Verdict: TypeAlias = Literal[
 ]
 
 
+ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
+"""What a vehicle answers that has no such list at all."""
+
+
 @dataclass(frozen=True, slots=True)
 class PartReport:
     """What became of one list.
@@ -92,13 +96,15 @@ def download_lists(
 ) -> Job["Lists"]:
     """Download the lists of `types`, each that comes.
 
-    Where not even the first one comes, and it is not refused, the others are not asked for.
+    A vehicle that has no fence or rally points at all is one that has none stored. Where not even
+    the first list comes, and it is not refused, the others are not asked for.
     """
     items: dict[MissionType, tuple[WireItem, ...]] = {}
     missing: dict[MissionType, Outcome] = {}
     for part in types:
         outcome = yield Download(peer, part, timeouts)
-        if outcome.status == "accepted":
+        absent = part is not MissionType.MISSION and outcome.result in ABSENT
+        if outcome.status == "accepted" or absent:
             items[part] = outcome.items
             continue
         missing[part] = outcome
