@@ -8,19 +8,18 @@ are one less on the wire.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.errors import InputError
-from faao_mav.mission.command import FLOWN_TO, Frame
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Frame
 from faao_mav.mission.fence import RallyPoint, check_place
 from faao_mav.mission.fence_items import fence_items, fence_of, rally_items
 from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
 
-GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
-"""Frames whose coordinates are latitude and longitude, by their numbers in MAV_FRAME."""
+GLOBAL_FRAMES = ABOVE_SEA | ABOVE_HOME | ABOVE_TERRAIN
+"""Frames whose coordinates are latitude and longitude."""
 
 _INT32 = range(-(2**31), 2**31)
 _FLOAT32 = 2.0**128 - 2.0**104
