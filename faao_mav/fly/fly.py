@@ -67,7 +67,7 @@ def fly(
         # A vehicle that flies already is not judged, and not kept busy.
         judged = arm or flight.streamed or not vehicle.armed
         asked = tuple(part for part in MissionType if judged or lists[part])
-        held = session.run(Script(read_held(peer, session.timeouts, asked, parameters=judged)))
+        held = session.run(Script(read_held(peer, asked, parameters=judged)))
         for part, outcome in held.missing.items():
             if lists[part]:
                 raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
@@ -79,9 +79,7 @@ def fly(
         )
         if wrong:
             return FlightReport(vehicle, wrong, None, FlightRecord.of(()))
-        ready = Readiness(
-            flight, held, peer, elsewhere=elsewhere, untimed=untimed, timeouts=session.timeouts
-        )
+        ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
         if flight.streamed and flight.solution is not None:
             from faao_mav.fly.stream import Stream
 

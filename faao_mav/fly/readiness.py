@@ -10,7 +10,6 @@ from faao_mav.validate.rule import Finding, Level
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.pace import Timeouts
 
 _STEADY = 5
 """Digits of a degree to which a place is looked at: a metre. Chosen."""
@@ -36,9 +35,8 @@ class Readiness:
         *,
         elsewhere: bool = False,
         untimed: bool = False,
-        timeouts: Timeouts | None = None,
     ) -> None:
-        self._flight, self._held, self._peer, self._timeouts = flight, held, peer, timeouts
+        self._flight, self._held, self._peer = flight, held, peer
         self._options = {"elsewhere": elsewhere, "untimed": untimed}
         self.findings: tuple[Finding, ...] | None = None
         self._judged: Seen | None = None
@@ -81,7 +79,7 @@ class Readiness:
         What it holds is read again; without fresh news of the vehicle it waits.
         """
         if self._reading is None:
-            self._reading = Script(read_held(self._peer, self._timeouts))
+            self._reading = Script(read_held(self._peer))
             return self._reading.start(now)
         if self._reading.outcome is None:
             return self._reading.tick(now)

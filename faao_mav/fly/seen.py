@@ -13,7 +13,6 @@ from faao_mav.wire.messages import HomePosition, WireItem
 from faao_mav.wire.parameters import Names, Reading, ReadParameters
 from faao_mav.wire.protocol import HOME_POSITION, MissionType
 from faao_mav.wire.transfer.exchange import Outcome, Peer
-from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import download_lists
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.whereabouts import home_in
@@ -68,7 +67,6 @@ def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
 
 def read_held(
     peer: Peer,
-    timeouts: Timeouts | None = None,
     parts: Sequence[MissionType] = tuple(MissionType),
     *,
     parameters: bool = True,
@@ -78,10 +76,10 @@ def read_held(
     That are the lists `parts`, and with `parameters` these and its home.
     """
     assert peer.vehicle is not None
-    lists = yield from download_lists(parts, peer, timeouts)
+    lists = yield from download_lists(parts, peer)
     if MissionType.MISSION in lists.missing or not parameters:
         return Held(lists.items, Reading({}), lists.missing)
-    reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle), timeouts)
+    reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle))
     told: list[HomePosition] = yield ask_for(peer.address, HOME_POSITION, HomePosition)
     try:
         home = home_in(told[0]) if told else None

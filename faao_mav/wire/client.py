@@ -131,7 +131,7 @@ def upload(
     check_settable(parameters or (), "parameters")
 
     def job(session: Session) -> Work:
-        peer, timeouts = session.peer, session.timeouts
+        peer = session.peer
         if made_for is not None and peer.vehicle is not None:
             mistake = addressee_mistake(made_for, peer.vehicle)
             if mistake is not None:
@@ -140,14 +140,14 @@ def upload(
         told: list[GlobalPositionInt] = yield ask_for(peer.address, POSITION, GlobalPositionInt)
         place = place_in(told[0]) if told else None
         stands = None if place is None else Whereabouts.of(place, mission)
-        changes, problem = yield from set_parameters(parameters or {}, peer, timeouts)
+        changes, problem = yield from set_parameters(parameters or {}, peer)
         if problem:
             return UploadReport(session.found, (), 0.0, (problem,), stands, changes)
         given = [(part, items) for part, items in lists.items() if items]
-        reports = yield from upload_parts(given, peer, timeouts)
+        reports = yield from upload_parts(given, peer)
         if clear_rest and all(each.verified for each in reports):
             rest = [part for part, items in lists.items() if not items]
-            cleared = yield from clear_lists(rest, peer, timeouts)
+            cleared = yield from clear_lists(rest, peer)
             reports += tuple(each for each in cleared if each.result not in ABSENT)
         return UploadReport(session.found, reports, 0.0, (), stands, changes)
 
@@ -167,7 +167,7 @@ def clear(
     """
 
     def job(session: Session) -> Work:
-        reports = yield from clear_lists(types, session.peer, session.timeouts)
+        reports = yield from clear_lists(types, session.peer)
         return UploadReport(session.found, reports, 0.0, ())
 
     return _change(connection, Mission(()), allow_armed, job, options)
@@ -234,7 +234,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     """
     with Session(connection, options, knocks=True) as session:
         peer = session.peer
-        lists = session.run(Script(download_lists(tuple(MissionType), peer, session.timeouts)))
+        lists = session.run(Script(download_lists(tuple(MissionType), peer)))
         missing = {part: session.not_read(part, why) for part, why in lists.missing.items()}
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
@@ -263,7 +263,7 @@ class Session:
             raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
         self._observe, self._note = options.get("observe"), options.get("note") or warnings.warn
         self._key_file = options.get("signing_key")
-        self.timeouts = options.get("timeouts") or Timeouts()
+        self._timeouts = options.get("timeouts") or Timeouts()
         self.started = time.monotonic()
         self._signing = None if self._key_file is None else read_signing(self._key_file)
         own = options.get("own_system") or GROUND_STATION.system
@@ -279,7 +279,8 @@ class Session:
         except BaseException:
             self.close()
             raise
-        self.peer = Peer(self.link.address, self.found.address, self.found.vehicle)
+        ends = self.link.address, self.found.address
+        self.peer = Peer(*ends, self.found.vehicle, timeouts=self._timeouts)
 
     def __enter__(self) -> "Session":
         return self
@@ -303,7 +304,7 @@ class Session:
             *names,
             patience=wait,
             settle=SETTLE if self.link.listens else None,
-            boot=self.timeouts.boot,
+            boot=self._timeouts.boot,
             knocks=knocks and parse_connection(connection).kind == "serial",
         )
         found = self.run(discovery)
@@ -316,7 +317,7 @@ class Session:
         old = self.link.speaks_old(one.address)
         if self._signing is None and not old:
             return one
-        if self.run(ask_alive(one.address, secrets.randbits(62), self.timeouts.silence)):
+        if self.run(ask_alive(one.address, secrets.randbits(62), self._timeouts.silence)):
             return one
         why = (
             "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "

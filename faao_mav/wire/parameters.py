@@ -16,7 +16,7 @@ from faao_mav.errors import InputError
 from faao_mav.wire.machine import Ask, Machine, Progress
 from faao_mav.wire.messages import Envelope, Message, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.pace import Pace, Questions, Timeouts
+from faao_mav.wire.transfer.pace import Pace, Questions
 
 Names: TypeAlias = tuple[str, ...]
 """The names that one parameter has in the generations of an autopilot: a vehicle has one."""
@@ -95,14 +95,12 @@ class ReadParameters(Machine[Reading]):
     has no parameters.
     """
 
-    def __init__(
-        self, peer: Peer, parameters: Sequence[Names], timeouts: Timeouts | None = None
-    ) -> None:
+    def __init__(self, peer: Peer, parameters: Sequence[Names]) -> None:
         super().__init__()
         self._peer = peer
         self._all = tuple(dict.fromkeys(parameters))
         self._left = list(self._all)
-        self._asked = Questions[Names](Pace(timeouts or Timeouts()))
+        self._asked = Questions[Names](Pace(peer.timeouts))
         self._asked.least = _LEAST_WAIT
         self._settings: dict[str, Setting] = {}
         self._missing: list[Names] = []
@@ -160,9 +158,7 @@ class ReadParameters(Machine[Reading]):
         return [ParamRequestRead(self._peer.address, name, -1) for name in names]
 
 
-def set_parameter(
-    peer: Peer, name: str, setting: Setting, timeouts: Timeouts | None = None
-) -> Ask[bool]:
+def set_parameter(peer: Peer, name: str, setting: Setting) -> Ask[bool]:
     """Return a machine that sets the parameter `name` of the vehicle of `peer` to `setting`.
 
     It tells the value until the vehicle answers with it: setting it twice does no harm.
@@ -177,7 +173,7 @@ def set_parameter(
 
     number = on_the_wire(setting, peer.vehicle)
     question = ParamSet(peer.address, name, number, setting.kind)
-    return Ask(f"setting {name}", question, answer, (timeouts or Timeouts()).silence)
+    return Ask(f"setting {name}", question, answer, peer.timeouts.silence)
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +234,7 @@ def named(names: Sequence[str]) -> str:
 
 
 def set_parameters(
-    wanted: Mapping[str, float], peer: Peer, timeouts: Timeouts | None = None
+    wanted: Mapping[str, float], peer: Peer
 ) -> Generator[Machine[Any], Any, tuple[tuple[Change, ...], str]]:
     """Give the vehicle of `peer` the parameters of its table that `wanted` names, and read them.
 
@@ -251,7 +247,7 @@ def set_parameters(
     unknown = [(name,) for name in wanted if not any(name in names for names in groups)]
     before = Reading({})
     if not unknown:
-        before = yield ReadParameters(peer, tuple(groups), timeouts)
+        before = yield ReadParameters(peer, tuple(groups))
         unknown = [*before.missing]
     if unknown:
         names = named([" or ".join(each) for each in unknown])
@@ -264,9 +260,9 @@ def set_parameters(
             asked[name] = number
     for name, number in asked.items():
         kind = before.settings[name].kind
-        if not (yield set_parameter(peer, name, Setting(number, kind), timeouts)):
+        if not (yield set_parameter(peer, name, Setting(number, kind))):
             break
-    after: Reading = yield ReadParameters(peer, [(name,) for name in asked], timeouts)
+    after: Reading = yield ReadParameters(peer, [(name,) for name in asked])
     changes = tuple(
         Change(name, before.settings[name].value, number, after.values.get(name))
         for name, number in asked.items()

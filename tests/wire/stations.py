@@ -23,7 +23,6 @@ from faao_mav.wire.messages import (
 from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
 from faao_mav.wire.transfer.download import Download
 from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import upload_parts
 from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.wire_items import wire_items
@@ -113,13 +112,12 @@ def upload_to(
     faults: Faults | None = None,
     *,
     part: MissionType = MissionType.MISSION,
-    timeouts: Timeouts | None = None,
     until: float = 600.0,
     **more: Any,
 ) -> tuple[Any, float]:
     """Upload `rows` to `mock` over a simulated link, verified; report and time taken."""
     peer = peer_of(mock.behaviour.family.key)
-    script = Script(upload_parts([(part, tuple(rows))], peer, timeouts=timeouts))
+    script = Script(upload_parts([(part, tuple(rows))], peer))
     client = Station(script, GROUND_STATION)
     took = simulate(client, Station(mock, VEHICLE), faults, until, **more)
     return (script.outcome[0] if script.outcome else None), took

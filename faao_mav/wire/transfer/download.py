@@ -15,7 +15,6 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.transfer.exchange import OPENING, TENTATIVE, Exchange, Peer
-from faao_mav.wire.transfer.pace import Pace, Timeouts
 
 _LATE = 0.4
 """By how many seconds packets are taken to be late, once one has ended a transfer: chosen, above
@@ -40,14 +39,8 @@ class Download(Exchange):
 
     writes = False
 
-    def __init__(
-        self,
-        peer: Peer,
-        mission_type: MissionType = MissionType.MISSION,
-        timeouts: Timeouts | None = None,
-        pace: Pace | None = None,
-    ) -> None:
-        super().__init__(peer, mission_type, timeouts, pace)
+    def __init__(self, peer: Peer, mission_type: MissionType = MissionType.MISSION) -> None:
+        super().__init__(peer, mission_type)
         self._attempts_left = self._timeouts.attempts
         self._count: int | None = None
         self._opaque_id = 0

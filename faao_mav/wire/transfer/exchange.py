@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
@@ -39,12 +39,18 @@ class Peer:
     """Both ends of a transfer, and what flies at the other: None if its autopilot is not known.
 
     Unless it `may_be_armed`, nothing more is written once a heartbeat of it says that it is armed.
+    `pace` is what its transfers have learnt so far of how long answers take.
     """
 
     own: Address
     address: Address
     vehicle: VehicleType | None
     may_be_armed: bool = False
+    timeouts: Timeouts = field(default_factory=Timeouts)
+    pace: Pace = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pace", Pace(self.timeouts))
 
     @property
     def manners(self) -> Manners:
@@ -92,17 +98,10 @@ class Exchange(Machine[Outcome]):
 
     writes = True
 
-    def __init__(
-        self,
-        peer: Peer,
-        mission_type: MissionType = MissionType.MISSION,
-        timeouts: Timeouts | None = None,
-        pace: Pace | None = None,
-    ) -> None:
+    def __init__(self, peer: Peer, mission_type: MissionType = MissionType.MISSION) -> None:
         super().__init__()
-        self._timeouts = timeouts or Timeouts()
-        self._peer, self._type = peer, mission_type
-        self._questions = Questions[int](pace or Pace(self._timeouts))
+        self._peer, self._type, self._timeouts = peer, mission_type, peer.timeouts
+        self._questions = Questions[int](peer.pace)
         self._until = 0.0
         """When it is given up, s."""
         self._result: int | None = None

@@ -14,7 +14,6 @@ from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType, meaning
 from faao_mav.wire.transfer.download import Download
 from faao_mav.wire.transfer.exchange import TENTATIVE, Clear, Outcome, Peer
-from faao_mav.wire.transfer.pace import Pace, Timeouts
 from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
@@ -68,9 +67,7 @@ class Lists:
 
 
 def upload_parts(
-    parts: Sequence[tuple[MissionType, tuple[WireItem, ...]]],
-    peer: Peer,
-    timeouts: Timeouts | None = None,
+    parts: Sequence[tuple[MissionType, tuple[WireItem, ...]]], peer: Peer
 ) -> Job[tuple[PartReport, ...]]:
     """Upload lists one after the other, read each back and compare; stop at the first failure.
 
@@ -80,7 +77,7 @@ def upload_parts(
     """
     reports: list[PartReport] = []
     for part, items in parts:
-        report, armed = yield from _upload_part(part, items, peer, timeouts or Timeouts())
+        report, armed = yield from _upload_part(part, items, peer)
         reports.append(report)
         if not report.verified:
             break
@@ -91,9 +88,7 @@ def upload_parts(
     return tuple(reports)
 
 
-def download_lists(
-    types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
-) -> Job["Lists"]:
+def download_lists(types: Sequence[MissionType], peer: Peer) -> Job["Lists"]:
     """Download the lists of `types`, each that comes.
 
     A vehicle that has no fence or rally points at all is one that has none stored. Where not even
@@ -102,7 +97,7 @@ def download_lists(
     items: dict[MissionType, tuple[WireItem, ...]] = {}
     missing: dict[MissionType, Outcome] = {}
     for part in types:
-        outcome = yield Download(peer, part, timeouts)
+        outcome = yield Download(peer, part)
         absent = part is not MissionType.MISSION and outcome.result in ABSENT
         if outcome.status == "accepted" or absent:
             items[part] = outcome.items
@@ -113,16 +108,14 @@ def download_lists(
     return Lists(items, missing)
 
 
-def clear_lists(
-    types: Sequence[MissionType], peer: Peer, timeouts: Timeouts | None = None
-) -> Job[tuple[PartReport, ...]]:
+def clear_lists(types: Sequence[MissionType], peer: Peer) -> Job[tuple[PartReport, ...]]:
     """Clear the lists of `types`, and read back that they are empty (but for the home item)."""
     reports = []
     for part in types:
-        cleared = yield Clear(peer, part, timeouts)
+        cleared = yield Clear(peer, part)
         report = _failed(part, 0, cleared, 1)
         if cleared.status in ("accepted", "silent"):
-            read = yield Download(peer, part, timeouts)
+            read = yield Download(peer, part)
             if read.status == "accepted":
                 differences = compare(
                     read.items[: home_items(peer.vehicle, part)], read.items, part, peer.vehicle
@@ -141,15 +134,15 @@ def _own_items(part: MissionType, items: Sequence[WireItem], peer: Peer) -> int:
 
 
 def _upload_part(
-    part: MissionType, items: tuple[WireItem, ...], peer: Peer, timeouts: Timeouts
+    part: MissionType, items: tuple[WireItem, ...], peer: Peer
 ) -> Job[tuple[PartReport, bool]]:
     """Return what became of a list, and whether the vehicle was armed when it was read back."""
-    number, pace = _own_items(part, items, peer), Pace(timeouts)
-    for attempt in range(1, timeouts.attempts + 1):
-        sent: Outcome = yield Upload(items, peer, part, timeouts, pace)
+    number = _own_items(part, items, peer)
+    for attempt in range(1, peer.timeouts.attempts + 1):
+        sent: Outcome = yield Upload(items, peer, part)
         report, armed, stop = _failed(part, number, sent, attempt), sent.armed, sent.by_us
         if sent.status in ("accepted", "unknown"):
-            read: Outcome = yield Download(peer, part, timeouts, pace)
+            read: Outcome = yield Download(peer, part)
             armed, stop = armed or read.armed, read.by_us
             if read.status == "accepted":
                 differences = compare(items, read.items, part, peer.vehicle)

@@ -17,7 +17,6 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import MavResult, MavState, MissionType
 from faao_mav.wire.transfer.exchange import OPENING, TENTATIVE, Exchange, Peer
-from faao_mav.wire.transfer.pace import Pace, Timeouts
 
 _REASONS = 1.5
 """Seconds to wait after a refusal for the status text that gives the reason, and for a heartbeat,
@@ -55,12 +54,10 @@ class Upload(Exchange):
         items: Sequence[WireItem],
         peer: Peer,
         mission_type: MissionType = MissionType.MISSION,
-        timeouts: Timeouts | None = None,
-        pace: Pace | None = None,
     ) -> None:
         if not items:
             raise InputError(f"upload: no {mission_type.title} items; clear the list instead")
-        super().__init__(peer, mission_type, timeouts, pace)
+        super().__init__(peer, mission_type)
         self._items = tuple(items)
         self._current = self._requested = self._furthest = OPENING
         """The item that the vehicle waits for, as far as is known, the one that it asked for last,
