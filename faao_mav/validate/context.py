@@ -155,9 +155,10 @@ class ValidationContext:
     @cached_property
     def orbits(self) -> dict[int, Orbit]:
         """How the vehicle circles, by the index of the item."""
-        own = self.vehicle.type
-        found = {k: own.orbits(self.vehicle, own.dialect.sent(i)) for k, i in self.each(*FLOWN_TO)}
-        return {k: orbit for k, orbit in found.items() if orbit is not None}
+        own, placed = self.vehicle.type, self.each(*FLOWN_TO)
+        sent = ((k, own.dialect.sent(item)) for k, item in placed if fits_message(item))
+        found = ((k, own.orbits(self.vehicle, item)) for k, item in sent)
+        return {k: orbit for k, orbit in found if orbit is not None}
 
     @cached_property
     def circles(self) -> dict[int, Real]:
