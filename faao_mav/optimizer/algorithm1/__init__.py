@@ -38,77 +38,64 @@ from faao_mav.radio.precoder import SCHEMES
 MAX_CONES = 300_000
 """Exponential cones accepted in a convex problem: slots times classes, both links. Chosen."""
 
-Pair = tuple[Complex, Complex]
-"""An array for each link: BS to UAV, UAV to user."""
-
 
 @dataclass(frozen=True, slots=True)
 class _Iterate:
-    """Trajectory, H_r and precoders after an iteration."""
+    """A trajectory, and for both links H_r and the precoders, with R_avg of (9), bit/s/Hz."""
 
     flight: Trajectory
-    fading: Pair
-    precoders: Pair
+    fading: tuple[Complex, Complex]
+    precoders: tuple[Complex, Complex]
+    rate: float
 
 
 def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution:
     """Return the best iterate of Algorithm 1 on `problem`.
 
     With an `optimizer.precoder` other than `faao`, that scheme at the new positions takes the place
-    of (35): the paper's comparison. `observe` is told the progress after every convex problem.
-    Raises `PlanError` for a plan that is not for Algorithm 1 or whose alphabet makes the problems
-    too large, `InfeasibleError` where no flight satisfies the plan.
+    of (35): the paper's comparison. `observe` is told the progress before every step. Raises
+    `PlanError` for a plan that is not for Algorithm 1 or whose alphabet makes the problems too
+    large, `InfeasibleError` where no flight satisfies the plan.
     """
     _check_plan(problem)
     options = problem.plan.optimizer
-    best = current = _start(problem)
-    history = [_rate(problem, current)]
-    converged, ending = False, f"max_iterations ({options.max_iterations}) reached"
-    for iteration in range(1, options.max_iterations + 1):
-
-        def tell(stage: str, iteration: int = iteration) -> None:
-            if observe is not None:
-                observe(Progress(iteration, options.max_iterations, stage, max(history)))
-
-        try:
-            current = _next(problem, current, tell)
-        except SolverError as error:
-            ending = f"stopped in iteration {iteration}, the best so far is kept: {error}"
-            break
-        history.append(_rate(problem, current))
-        if history[-1] >= max(history):
-            best = current
-        if abs(history[-1] - history[-2]) < options.tolerance:
-            converged, ending = True, f"R_avg changed by less than {options.tolerance:g} bit/s/Hz"
-            break
-    made = (best.flight, best.fading, best.precoders)
-    return make_solution(problem, *made, history, converged=converged, ending=ending)
-
-
-def _start(problem: Problem) -> _Iterate:
-    """Return the straight flight with equal-power precoders, sqrt(W / N) I, or the scheme's."""
 
     def equal_power(_: int, link: Link, H: Complex) -> Complex:
         N = link.transmit
         return np.tile(np.sqrt(link.power / N) * np.eye(N) + 0j, (len(H), 1, 1))
 
-    return _iterate_at(problem, straight_flight(problem.kinematics), equal_power)
+    iterates = [_iterate_at(problem, straight_flight(problem.kinematics), equal_power)]
+    converged, ending = False, f"max_iterations ({options.max_iterations}) reached"
+    for iteration in range(1, options.max_iterations + 1):
+
+        def tell(stage: str, iteration: int = iteration) -> None:
+            if observe is not None:
+                best = max(iterate.rate for iterate in iterates)
+                observe(Progress(iteration, options.max_iterations, stage, best))
+
+        try:
+            iterates.append(_next(problem, iterates[-1], tell))
+        except SolverError as error:
+            ending = f"stopped in iteration {iteration}, the best so far is kept: {error}"
+            break
+        if abs(iterates[-1].rate - iterates[-2].rate) < options.tolerance:
+            converged, ending = True, f"R_avg changed by less than {options.tolerance:g} bit/s/Hz"
+            break
+    best = max(reversed(iterates), key=lambda iterate: iterate.rate)
+    made = (best.flight, best.fading, best.precoders)
+    history = [iterate.rate for iterate in iterates]
+    return make_solution(problem, *made, history, converged=converged, ending=ending)
 
 
 def _next(problem: Problem, last: _Iterate, tell: Callable[[str], None]) -> _Iterate:
     """Return the next iterate, by steps 3 and 4."""
     tell("trajectory (27)")
     both = zip(problem.links, last.fading, last.precoders, strict=True)
-    sums = tuple(link_sum(*one) for one in both)
-    flight = optimize_trajectory(
-        problem, sums, last.flight, observe=lambda _: tell("trajectory (27)")
+    flight = optimize_trajectory(problem, tuple(link_sum(*one) for one in both), last.flight)
+    tell("precoders (35)")
+    return _iterate_at(
+        problem, flight, lambda j, link, H: optimize_precoders(link, H, last.precoders[j])
     )
-
-    def best(number: int, link: Link, H: Complex) -> Complex:
-        before = last.precoders[number]
-        return optimize_precoders(link, H, before, observe=lambda _: tell("precoders (35)"))
-
-    return _iterate_at(problem, flight, best)
 
 
 def _iterate_at(
@@ -119,42 +106,38 @@ def _iterate_at(
     These are given for the number of a link, the link and its channels H, (1) or (2).
     """
     scheme = SCHEMES.get(problem.plan.optimizer.precoder)
-    fading, chosen = [], []
+    fading, chosen, rates = [], [], []
     for number, link in enumerate(problem.links):
         H_r = link.small_scale(flight.w)
         H = link.channel(flight.w, H_r)
-        fading.append(H_r)
         P = scheme(H, link.power, link.noise) if scheme else precoders(number, link, H)
+        fading.append(H_r)
         chosen.append(P)
-    return _Iterate(flight, (fading[0], fading[1]), (chosen[0], chosen[1]))
-
-
-def _rate(problem: Problem, iterate: _Iterate) -> float:
-    """Return R_avg of (9), bit/s/Hz."""
-    return min(
-        float(link.rates(iterate.flight.w, H_r, P).mean())
-        for link, H_r, P in zip(problem.links, iterate.fading, iterate.precoders, strict=True)
-    )
+        rates.append(float(link.rates(flight.w, H_r, P).mean()))
+    return _Iterate(flight, (fading[0], fading[1]), (chosen[0], chosen[1]), min(rates))
 
 
 def _check_plan(problem: Problem) -> None:
     """Raise `PlanError` for plans that Algorithm 1 is not made for."""
     plan = problem.plan
-    if plan.radio.fading == "ergodic":
-        raise PlanError(
-            f"{plan.source}: radio.fading: ergodic is not for algorithm1, which plans for one "
-            "known draw; use realization or none, or optimizer.method: direct"
-        )
-    if plan.optimizer.inputs == "gaussian":
-        raise PlanError(
-            f"{plan.source}: optimizer.inputs: gaussian is not for algorithm1, whose sums are "
-            "those of an alphabet; use optimizer.method: direct"
-        )
-    if plan.optimizer.rate != "cutoff":
-        raise PlanError(
-            f"{plan.source}: optimizer.rate: {plan.optimizer.rate} is not for algorithm1, whose "
-            "sums are those of the cutoff rate; use cutoff, or optimizer.method: direct"
-        )
+    for refused, setting, reason in (
+        (plan.radio.fading == "ergodic", "radio.fading: ergodic", "it plans for one known draw"),
+        (
+            plan.optimizer.inputs == "gaussian",
+            "optimizer.inputs: gaussian",
+            "its sums are those of an alphabet",
+        ),
+        (
+            plan.optimizer.rate != "cutoff",
+            f"optimizer.rate: {plan.optimizer.rate}",
+            "its sums are those of the cutoff rate",
+        ),
+    ):
+        if refused:
+            raise PlanError(
+                f"{plan.source}: {setting} is not for algorithm1, as {reason}; change it, or use "
+                "optimizer.method: direct"
+            )
     cones = problem.kinematics.slots * sum(len(k.classes.multiplicity) for k in problem.links)
     if cones > MAX_CONES:
         raise PlanError(

@@ -15,52 +15,37 @@ import scipy.sparse as sp
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.algorithm1.successive import (
-    Observer,
     rounded,
     shrink,
     successive_approximation,
 )
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.scaled import solve
+from faao_mav.radio.rate import exponents
 
 
-def optimize_precoders(
-    link: Link, H: Complex, P: Complex, *, observe: Observer | None = None
-) -> Complex:
+def optimize_precoders(link: Link, H: Complex, P: Complex) -> Complex:
     """Return precoders that minimise the sum of (15) of `link` within tr(P^H P) <= W.
 
     `H` (N + 2, N_r, N_t) are channels (1) or (2), `P` (N + 2, N_t, N_t) the precoders to start
-    from, sqrt(W). `observe` is told the sum over the non-zero classes, which never increases.
-    Raises `SolverError` where Clarabel fails.
+    from, sqrt(W); the sum never increases. Raises `SolverError` where Clarabel fails.
     """
-    M = H.conj().mT @ H
 
     def objective(precoders: Complex) -> float:
-        C = precoder_exponents(M, precoders, link.classes.vectors, link.noise)
+        C = exponents(H, precoders, link.classes.vectors, link.noise)
         return float((link.classes.multiplicity * np.exp(-C)).sum())
 
     return successive_approximation(
         P,
         objective,
-        lambda last, gap: _solve_35(link, M, last, gap),
+        lambda last, gap: _solve_35(link, H, last, gap),
         floor=0.0,
         scale=len(P) * link.classes.symbols,
-        observe=observe,
     )
 
 
-def precoder_exponents(M: Complex, P: Complex, u: Complex, noise: float) -> Real:
-    """Return the exponents C / (4 sigma²) = u^H P^H M P u / (4 sigma²), (n, k).
-
-    `M` (n, N, N), `P` (n, N, N) in sqrt(W), `u` (k, N), `noise` sigma² in W.
-    """
-    Pu = np.einsum("nab,kb->nka", P, u)
-    C = np.einsum("nka,nab,nkb->nk", Pu.conj(), M, Pu, optimize=True).real
-    return np.asarray(C / (4 * noise))
-
-
 def precoder_tangent(
-    M: Complex, P_i: Complex, u: Complex, power: float, noise: float
+    H: Complex, P_i: Complex, u: Complex, power: float, noise: float
 ) -> tuple[Real, Real]:
     """Return the tangent C^ap / (4 sigma²) = slope p - c of Proposition 2 about the precoders P_i.
 
@@ -68,19 +53,19 @@ def precoder_tangent(
     (n, k, 2 N²), c (n, k) are the exponents at P_i.
     """
     N = P_i.shape[1]
-    b = np.einsum("nab,nbc,kc->nka", M, P_i, u, optimize=True)
+    b = np.einsum("nab,nbc,kc->nka", H.conj().mT @ H, P_i, u, optimize=True)
     z = b.conj()[..., :, None] * u[None, :, None, :]
     z = z.reshape(*z.shape[:2], N * N) * (2 * np.sqrt(power) / (4 * noise))
-    return np.concatenate([z.real, -z.imag], axis=-1), precoder_exponents(M, P_i, u, noise)
+    return np.concatenate([z.real, -z.imag], axis=-1), exponents(H, P_i, u, noise)
 
 
-def _solve_35(link: Link, M: Complex, P_i: Complex, scale: float) -> Complex:
+def _solve_35(link: Link, H: Complex, P_i: Complex, scale: float) -> Complex:
     """Return the solution of the part of (35) that belongs to `link` about P_i.
 
     `scale`, the sum at P_i, is the unit of the objective.
     """
     slots, N = P_i.shape[:2]
-    slope, c = precoder_tangent(M, P_i, link.classes.vectors, link.power, link.noise)
+    slope, c = precoder_tangent(H, P_i, link.classes.vectors, link.power, link.noise)
     factor = shrink(c)
     width = 2 * N * N
     terms = c.size

@@ -27,9 +27,6 @@ solver's iterations, and its solution by up to 1e-3 m. Chosen: no decrease below
 hangs on more.
 """
 
-Observer = Callable[[float], None]
-"""Is told the objective after every convex problem."""
-
 Point = TypeVar("Point")
 
 
@@ -40,13 +37,12 @@ def successive_approximation(
     *,
     floor: float,
     scale: float,
-    observe: Observer | None,
 ) -> Point:
     """Return the point that repeated convex problems lead to from the feasible `start`.
 
     `objective`, the true value of a point, never increases; `floor` is a lower bound on it, the gap
     the distance to that, `scale` the largest possible gap. `solve_about` gives the solution of the
-    convex problem about a point with a gap. `observe` is told the objective after each.
+    convex problem about a point with a gap.
     """
     point, value = start, objective(start)
     for _ in range(MAX_STEPS):
@@ -58,8 +54,6 @@ def successive_approximation(
         decrease = max(0.0, value - reached)
         if reached < value:
             point, value = candidate, reached
-        if observe is not None:
-            observe(value)
         if decrease <= MIN_DECREASE * gap:
             break
     return point

@@ -13,10 +13,9 @@ import cvxpy as cp
 import numpy as np
 import scipy.sparse as sp
 
-from faao_mav.arrays import Complex, Integers, Real
+from faao_mav.arrays import Complex, Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.algorithm1.successive import (
-    Observer,
     rounded,
     shrink,
     successive_approximation,
@@ -62,8 +61,6 @@ def optimize_trajectory(
     problem: Problem,
     sums: tuple[SumOfExponentials, ...],
     flight: Trajectory,
-    *,
-    observe: Observer | None = None,
 ) -> Trajectory:
     """Solve (27) again and again about its last solution, from the feasible `flight`.
 
@@ -77,7 +74,6 @@ def optimize_trajectory(
         lambda last, gap: _solve_27(problem, sums, last, floor, gap),
         floor=floor,
         scale=len(flight.w) * max(s.link.classes.symbols for s in sums),
-        observe=observe,
     )
 
 
@@ -113,28 +109,11 @@ def convex_bound(
     y_i = np.sum((w_i - link.station) ** 2, axis=1)
     d2 = y_i + link.altitude**2
     c = s.A / d2[:, None]
-    slot, c, multiplicity = merge_equal(rounded(c * shrink(c)), link.classes.multiplicity)
+    c = rounded(c * shrink(c))
+    slot, classes = np.divmod(np.arange(c.size), c.shape[1])
+    weight = rounded(np.log(link.classes.multiplicity / gap))[classes]
     q = cp.Variable(len(w_i))
     offset = cp.multiply(LENGTH / np.sqrt(d2)[:, None] * np.ones(2), w - link.station / LENGTH)
-    select = sp.csr_array((c, (np.arange(len(c)), slot)), shape=(len(c), len(w_i)))
-    terms = cp.exp(select @ q - c + rounded(np.log(multiplicity / gap)))
+    select = sp.csr_array((c.ravel(), (np.arange(c.size), slot)), shape=(c.size, len(w_i)))
+    terms = cp.exp(select @ q - c.ravel() + weight)
     return cp.sum(terms), [cp.sum(cp.square(offset), axis=1) - y_i / d2 <= q]
-
-
-def merge_equal(c: Real, multiplicity: Real) -> tuple[Integers, Real, Real]:
-    """Merge the terms multiplicity exp(-c) of one slot whose exponents `c` (n, k) agree to 1e-12.
-
-    Returns slot index, exponent and multiplicity of the remaining terms, flat, slot by slot.
-
-    >>> merge_equal(np.array([[1.0, 2.0, 1.0]]), np.array([1.0, 2.0, 4.0]))
-    (array([0, 0]), array([1., 2.]), array([5., 2.]))
-    """
-    order = np.argsort(c, axis=1)
-    c = np.take_along_axis(c, order, axis=1)
-    weight = multiplicity[order]
-    new = np.ones(c.shape, dtype=bool)
-    new[:, 1:] = np.diff(c, axis=1) > 1e-12 * (1 + c[:, 1:])
-    term = np.cumsum(new.ravel()) - 1
-    merged = np.bincount(term, weights=weight.ravel()).astype(np.float64)
-    slots = np.repeat(np.arange(len(c)), c.shape[1]).reshape(c.shape)
-    return slots[new], c[new], merged
