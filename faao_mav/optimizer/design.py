@@ -53,9 +53,9 @@ class Design:
         if self.optimal:
             draws = np.moveaxis(H, 0, -3) if self.blind else H[..., None, :, :]
             return link.best(draws, start)
-        known = H.mean(axis=0) if self.blind else H
+        H = H.mean(axis=0) if self.blind else H
         scheme = "waterfilling" if self.scheme == "faao" else self.scheme
-        return SCHEMES[scheme](known, power, noise)
+        return SCHEMES[scheme](H, power, noise)
 
     def rate(self, link: Link, H: Draws, P: Complex) -> Real:
         """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""

@@ -195,7 +195,7 @@ def _at_exact_rates(
     """Return the flight of `optimum`, its precoders, and by how much its value is too large.
 
     Where searched precoders were interpolated in a table of modes, the flight is taken a little
-    further with precoders that are held: the rates are then exact, and whatever they gain the best
+    further with fixed precoders: the rates are then exact, and whatever they gain the best
     ones gain too.
     """
     flight, kin = optimum.trajectory, problem.kinematics
@@ -208,13 +208,13 @@ def _at_exact_rates(
     cutoff = problem.plan.optimizer.rate == "cutoff"
     if not cutoff or all(_is_exact(rate) for rate in field.rates):
         return flight, precoders, error
-    held = [
+    fixed = [
         FixedRate(link, unturned(link, link_coordinates(link, flight.w.T).cosine, P))
         for link, P in zip(field.links, precoders, strict=True)
     ]
     flight = maximize(
         kin,
-        RateField(field.links, tuple(held)),
+        RateField(field.links, tuple(fixed)),
         flight,
         constraints=problem.constraints(kin),
         tolerance=problem.plan.optimizer.tolerance,
@@ -256,12 +256,12 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
     """
     H = link.channel(w, link.small_scale(w))
     at = link_coordinates(link, w.T)
-    known = rate.initial_precoders(at.gain_log, at.cosine) if scheme.optimal else None
-    if known is None:
+    near = rate.initial_precoders(at.gain_log, at.cosine) if scheme.optimal else None
+    if near is None:
         return scheme.precoders(link, H)
     if link.measure != "cutoff":
-        return known
-    carried = scheme.precoders(link, H, start=known)
+        return near
+    carried = scheme.precoders(link, H, start=near)
     if scheme.averaged or link.nlos is None:
         return carried
     afresh = scheme.precoders(link, H)

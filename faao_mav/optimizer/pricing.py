@@ -22,7 +22,7 @@ from faao_mav.radio.mutual_information import mutual_information
 from faao_mav.radio.rate import cutoff_rate
 
 SATURATED = 0.999
-"""Share of N log2(rho) from which a link counts as saturated. Chosen."""
+"""Part of N log2(rho) from which a link counts as saturated. Chosen."""
 
 _SAMPLED_PAIRS, _NOISES_PER_PAIR = 256, 64
 """Pairs of slot and draw of which the mutual information is averaged over noises, at most, and the
@@ -171,8 +171,8 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
         nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
         fresh = replace(link, nlos=nlos.reshape(draws, len(w), link.receive, link.transmit))
         H = link.channel(w, fresh.small_scale(w))
-        known = P[chosen] if how.blind else how.precoders(link, H)
-        at = np.maximum(0.0, link.draw_rates(H, known))
+        P = P[chosen] if how.blind else how.precoders(link, H)
+        at = np.maximum(0.0, link.draw_rates(H, P))
         rates.append(at)
         # The error is that of the draws within each slot, not the spread from slot to slot. With
         # one draw per slot only the spread over all slots is known, an upper estimate.

@@ -3,7 +3,7 @@
 - ``constellation``: the alphabets, and the differences between their vectors merged into classes;
 - ``channel``: path gain, line of sight, fading, (1) and (2);
 - ``rate``: the rate that counts by its name, and the cutoff rate, (7) and (8), from the sums of
-  ``class_sum``, which ``lattice_sum`` forms for square alphabets;
+  ``class_sum``, which ``square_sum`` forms for square alphabets;
 - ``mutual_information``: the mutual information, (5) and (6), at fixed noises;
 - ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas;
 - ``best_precoder``: the precoders of highest rate, one per channel or one for many draws, found by

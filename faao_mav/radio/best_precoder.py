@@ -33,7 +33,7 @@ from faao_mav.radio.quadratic_form import coordinates, outer
 from faao_mav.radio.rate import Measure
 
 _CHUNK = 4_000_000
-"""Numbers held at once while channels are searched together: 32 MB. Chosen."""
+"""Numbers in memory at once while channels are searched together: 32 MB. Chosen."""
 
 _FAINT = 1e-4
 """Trace of the gain matrix G below which the rate is proportional to the power: the best P is then
@@ -118,8 +118,8 @@ def best_precoders(
     else:
         P = np.empty((len(flat), N, N), dtype=np.complex128)
         given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
-        held = (1 if start is None else 20) * (12 * N**4 + 8 * S * N**2)
-        step = max(1, _CHUNK // held)
+        numbers = (1 if start is None else 20) * (12 * N**4 + 8 * S * N**2)
+        step = max(1, _CHUNK // numbers)
         for first in range(0, len(flat), step):
             part = slice(first, first + step)
             begin = None if given is None else given[part]

@@ -3,7 +3,7 @@
 With the Hermitian Z = P^H H^H H P / (4 σ²), every exponent of (7) and (8) is linear in Z:
 D_k = u_k^H Z u_k = Σ_a φ_ka z_a (``quadratic_form``). The classes, thousands of them, therefore
 enter only through products of matrices with the features φ, which are the same for all channels.
-Those of 16- and 64-QAM are summed by ``lattice_sum``.
+Those of 16- and 64-QAM are summed by ``square_sum``.
 """
 
 from functools import lru_cache
@@ -12,11 +12,11 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.radio.constellation import DifferenceClasses
-from faao_mav.radio.lattice_sum import LatticeSum
 from faao_mav.radio.quadratic_form import features
+from faao_mav.radio.square_sum import SquareSum
 
 _BLOCK, _CLASSES = 1 << 17, 2048
-"""Exponents held at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
+"""Exponents in memory at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
 
 _TINY = 1e-300
 """The least sum that is told from zero: s is above -691."""
@@ -40,8 +40,8 @@ class ClassSum:
         self._terms = np.hstack([weights, weights * self._phi])
         self._by_parts = (
             None
-            if classes.lattice is None
-            else LatticeSum(classes.lattice, classes.vectors.shape[1], classes.symbols)
+            if classes.part_differences is None
+            else SquareSum(classes.part_differences, classes.vectors.shape[1], classes.symbols)
         )
 
     def value(self, z: Real) -> Real:

@@ -99,16 +99,16 @@ class DifferenceClasses:
 
     `vectors` (k, N) has one representative u of each class, `multiplicity` (k,) how many ordered
     pairs (m, k) lie in it. `symbols` is rho**N, the number of input vectors and the size of the
-    zero class; `bits` is N log2(rho), what one channel use carries at most. `lattice` are the
-    differences of the real or the imaginary parts of two symbols and how many ordered pairs of
-    levels give each, (2, L), where sums are formed by them: ``lattice_sum``.
+    zero class; `bits` is N log2(rho), what one channel use carries at most. `part_differences`
+    (2, L) are the differences of the real or the imaginary parts of two symbols, and how many
+    ordered pairs of levels give each, where sums are formed by them: ``square_sum``.
     """
 
     vectors: Complex
     multiplicity: Real
     symbols: int
     bits: float
-    lattice: Real | None
+    part_differences: Real | None
 
     @property
     def weight(self) -> Real:
@@ -167,10 +167,10 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     vectors, multiplicity = vectors[order], multiplicity[order]
     vectors.setflags(write=False)
     multiplicity.setflags(write=False)
-    lattice = None
+    part_differences = None
     if antennas > 1 and modulation in _BY_PARTS:
         levels = np.unique(grid.real)
         steps, pairs = np.unique(np.rint(levels[:, None] - levels), return_counts=True)
-        lattice = np.stack([steps * scale, pairs])
+        part_differences = np.stack([steps * scale, pairs])
     bits = antennas * float(np.log2(len(grid)))
-    return DifferenceClasses(vectors, multiplicity, len(grid) ** antennas, bits, lattice)
+    return DifferenceClasses(vectors, multiplicity, len(grid) ** antennas, bits, part_differences)

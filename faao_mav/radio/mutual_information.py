@@ -40,7 +40,7 @@ _RAREST = 1e-9
 """Probability of the noises beyond the largest that is used, 6 standard deviations. Chosen."""
 
 _CHUNK = 1 << 18
-"""Likelihoods held at once: 2 MB, which stay in a processor's cache. Chosen."""
+"""Likelihoods in memory at once: 2 MB, which stay in a processor's cache. Chosen."""
 
 _NOISES = 128
 """Noises handled together at least, which keeps the inner loops long. Chosen."""
@@ -78,7 +78,7 @@ def noise_set(
 ) -> NoiseSet:
     """Return the fixed set for an alphabet on so many antennas, and so many draws.
 
-    It is a rank-1 lattice of about `nodes` points, of which every draw has its share, moved by a
+    It is a rank-1 lattice of about `nodes` points, of which every draw has as many, moved by a
     random shift of the `seed` and folded (the tent transform, which makes the integrand periodic);
     normal numbers are made of even ones as Box and Muller do.
 
@@ -90,15 +90,15 @@ def noise_set(
     dimensions = points.shape[1]
     half = (dimensions + 1) // 2
     each = 2 ** max(0, round(float(np.log2(nodes / draws))))
-    shares = 2 ** int(np.ceil(np.log2(draws)))
-    total = each * shares
+    parts = 2 ** int(np.ceil(np.log2(draws)))
+    total = each * parts
     generator = np.array([pow(_KOROBOV, j, total) for j in range(1 + 2 * half)], dtype=np.int64)
     even = np.arange(total)[:, None] * generator % total / total
     rng = np.random.default_rng(seed)
     even = 1.0 - np.abs(2.0 * ((even + rng.random(1 + 2 * half)) % 1.0) - 1.0)
     even = np.minimum(even, 1.0 - _RAREST)
     # in random order: draws that change slowly from one to the next would meet few of the vectors
-    even = even.reshape(each, shares, -1).swapaxes(0, 1)[rng.permutation(shares)[:draws]]
+    even = even.reshape(each, parts, -1).swapaxes(0, 1)[rng.permutation(parts)[:draws]]
     kept = _sent(modulation, antennas)
     sent = kept[(even[..., 0] * len(kept)).astype(np.intp)]
     radius = np.sqrt(-2.0 * np.log1p(-even[..., 1 : 1 + half]))

@@ -21,12 +21,12 @@ Objective: TypeAlias = Callable[[Integers, Complex], tuple[Real, Complex]]
 
 _NEIGHBOURS = (-9, -5, -3, -2, -1, 1, 2, 3, 5, 9)
 _MARGIN = 0.03
-"""The channels, counted in the order of gains, whose optima a channel tries as well, and the share
+"""The channels, counted in the order of gains, whose optima a channel tries as well, and the part
 of F by which such an optimum may be worse before it is improved."""
 
 _STEPS = 120  # steps at most
 _FIRST, _LONGEST = 0.2, 0.7  # the first and the longest step, radians on the sphere ||Q||_F = 1
-_LEAST_REACH = 1e-6  # share of a step below which a refusal is due to rounding
+_LEAST_REACH = 1e-6  # part of a step below which a refusal is due to rounding
 
 
 def starting_points(gains: Real, antennas: int, random: int) -> Complex:
@@ -106,7 +106,7 @@ def minimise(objective: Objective, Q: Complex, tolerance: float) -> tuple[Comple
     """Return Q (b, q, N) and F (b,) where BFGS steps over ||Q||_F = 1 lead; F never rises.
 
     A point is done once the fall of F that the next step predicts is below that of raising the
-    transmit power by the share `tolerance`: a measure that means the same at any SNR.
+    transmit power by the part `tolerance`: a measure that means the same at any SNR.
 
     >>> G = np.diag([1.0, 4.0])
     >>> def objective(at, Q):  # -||diag(1, 2) Q||²
@@ -175,16 +175,16 @@ def _update(inverse: Real, s: Real, y: Real, fresh: Flags) -> None:
     """Correct the inverse Hessians (b, m, m) by what steps s (b, m) changed the gradients, y."""
     curvature = np.sum(s * y, axis=1)
     size = np.sum(y * y, axis=1)
-    known = np.flatnonzero(curvature > 1e-10 * np.sqrt(np.sum(s * s, axis=1) * size))
-    s, y, curvature = s[known], y[known], curvature[known]
-    first = fresh[known]
-    inverse[known[first]] = np.eye(s.shape[1]) * (curvature / size[known])[first][:, None, None]
-    fresh[known] = False
-    B = inverse[known]
+    bent = np.flatnonzero(curvature > 1e-10 * np.sqrt(np.sum(s * s, axis=1) * size))
+    s, y, curvature = s[bent], y[bent], curvature[bent]
+    first = fresh[bent]
+    inverse[bent[first]] = np.eye(s.shape[1]) * (curvature / size[bent])[first][:, None, None]
+    fresh[bent] = False
+    B = inverse[bent]
     By = (B @ y[:, :, None])[:, :, 0]
     rho = (1 / curvature)[:, None, None]
     crossed = s[:, :, None] * By[:, None, :]
     both = (1 + np.sum(y * By, axis=1) / curvature)[:, None, None]
-    inverse[known] = (
+    inverse[bent] = (
         B - rho * (crossed + crossed.swapaxes(1, 2)) + rho * both * (s[:, :, None] * s[:, None, :])
     )

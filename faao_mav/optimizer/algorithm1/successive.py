@@ -1,4 +1,4 @@
-"""Successive convex approximation: what the trajectory step and the precoder step share."""
+"""Successive convex approximation: what the trajectory step and the precoder step do."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -14,7 +14,7 @@ MIN_DECREASE = 1e-4
 """Decrease of the objective, relative to its gap, below which a step ends. Chosen."""
 
 NEGLIGIBLE = 1e-12
-"""Gap of the objective, as a share of its largest value, that counts as zero: rounding errors."""
+"""Gap of the objective, as a part of its largest value, that counts as zero: rounding errors."""
 
 CAP = 40.0
 """Largest exponent that is handed to the solver: e^-40 is 4e-18."""

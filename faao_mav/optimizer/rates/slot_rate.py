@@ -107,7 +107,7 @@ class FixedRate:
         """Return the derivatives of the cutoff rate by l and u, bits (n,).
 
         With D_k = φ_k z the exponents, linear in the coordinates z of Z = P^H H^H H P / (4 σ²), and
-        weights over all classes but zero that have the mean m and the share p of all classes' sum,
+        weights over all classes but zero that have the mean m and the part p of all classes' sum,
         they are p m z_a / ln 2; z and its derivative by l are one. H^LoS = D_r 1 1^T D^H with
         steering phases D_r, so that the rate at P = D Q is that at Q of D_r^H H_r D, of which only
         the scattered part depends on u.
@@ -123,9 +123,9 @@ class FixedRate:
         crossed = A.conj().mT @ A_u
         z_u = coordinates(crossed + crossed.conj().mT)
         s, mean = class_sum(link.classes).moments(z.reshape(-1, z.shape[-1]))
-        share = np.exp(-np.logaddexp(0.0, -s)).reshape(z.shape[:-1]) / _LN2
+        part = np.exp(-np.logaddexp(0.0, -s)).reshape(z.shape[:-1]) / _LN2
         mean = mean.reshape(z.shape)
-        return share * np.sum(mean * z, axis=-1), share * np.sum(mean * z_u, axis=-1)
+        return part * np.sum(mean * z, axis=-1), part * np.sum(mean * z_u, axis=-1)
 
 
 def unturned(link: Link, cosine: Real, P: Complex) -> Complex:

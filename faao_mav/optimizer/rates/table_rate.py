@@ -301,7 +301,7 @@ def _alike(here: Complex, there: Complex) -> Flags:
     return np.asarray(apart < _ALIKE * np.linalg.norm(here, axis=(-2, -1)))
 
 
-def _between(here: Complex, there: Complex, share: Real) -> Complex:
-    """Return precoders at a `share` (n,) of the way, the nearest of two that are not alike."""
-    part = np.where(_alike(here, there), share, np.rint(share))[..., None, None]
+def _between(here: Complex, there: Complex, fraction: Real) -> Complex:
+    """Return precoders at a `fraction` (n,) of the way, the nearest of two that are not alike."""
+    part = np.where(_alike(here, there), fraction, np.rint(fraction))[..., None, None]
     return np.asarray(here + part * (there - here))

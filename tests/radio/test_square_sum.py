@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.radio import lattice_sum
+from faao_mav.radio import square_sum
 from faao_mav.radio.constellation import constellation, difference_classes
-from faao_mav.radio.lattice_sum import LatticeSum
 from faao_mav.radio.quadratic_form import coordinates, features
+from faao_mav.radio.square_sum import SquareSum
 
 
 def pair_sums(modulation: str, antennas: int, Z: Complex) -> Real:
@@ -37,11 +37,11 @@ def test_sums_over_all_differences(
     A[6, :, -1] *= 30.0
     Z = A.conj().mT @ A
     classes = difference_classes(modulation, antennas)
-    assert classes.lattice is not None
-    sums = LatticeSum(classes.lattice, antennas, classes.symbols)
+    assert classes.part_differences is not None
+    sums = SquareSum(classes.part_differences, antennas, classes.symbols)
     expected = pair_sums(modulation, antennas, Z)
     scale = np.abs(expected).max(axis=1, keepdims=True)
     for block in (1, 1 << 18):
-        monkeypatch.setattr(lattice_sum, "_BLOCK", block)
+        monkeypatch.setattr(square_sum, "_BLOCK", block)
         found = sums.sums(coordinates(Z))
         np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-10)

@@ -1,4 +1,4 @@
-"""The sums of ``class_sum`` for square alphabets, whose differences are lattices.
+"""The sums of ``class_sum`` for square alphabets, by the parts of a difference.
 
 The real and the imaginary part of a difference u_1 of two 16- or 64-QAM symbols are chosen
 independently. With r the differences of the other streams, w = Σ_j Z_1j r_j / Z_11 and the Schur
@@ -17,33 +17,33 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.radio.quadratic_form import coordinates, features
 
 _BLOCK = 1 << 18
-"""Exponents held at once, 2 MB: long enough for NumPy's calls not to count. Chosen."""
+"""Exponents in memory at once, 2 MB: long enough for NumPy's calls not to count. Chosen."""
 
 _TINY = np.finfo(np.float64).tiny
 """The least number with all its digits."""
 
 
-class LatticeSum:
+class SquareSum:
     """The sums Σ_u multiplicity_u e^(-D_u) [1, φ] / rho^N over all non-zero differences u.
 
     >>> from faao_mav.radio.class_sum import ClassSum
     >>> from faao_mav.radio.constellation import difference_classes
     >>> classes = difference_classes("16qam", 2)
     >>> z = np.array([[1.0, 2.0, 0.3, -0.2]])
-    >>> s = np.log(LatticeSum(classes.lattice, 2, classes.symbols).sums(z)[:, 0])
+    >>> s = np.log(SquareSum(classes.part_differences, 2, classes.symbols).sums(z)[:, 0])
     >>> bool(np.isclose(s, ClassSum(classes).value(z), rtol=1e-12))
     True
     """
 
-    def __init__(self, lattice: Real, antennas: int, symbols: int) -> None:
-        values, pairs = lattice
+    def __init__(self, part_differences: Real, antennas: int, symbols: int) -> None:
+        values, pairs = part_differences
         self._squares = values ** np.arange(3)[:, None]
         self._powers = pairs * self._squares
-        alone, counts = _quarter(lattice, 1)
+        alone, counts = _quarter(part_differences, 1)
         self._alone = np.abs(alone[:, 0]) ** 2
-        shares = counts / np.sum(pairs)  # the other streams are alike in rho^(N - 1) pairs
-        self._alone_terms = self._alone[:, None] ** np.arange(2) * shares[:, None]
-        self._rest, counts = _quarter(lattice, antennas - 1)
+        weights = counts / np.sum(pairs)  # the other streams are alike in rho^(N - 1) pairs
+        self._alone_terms = self._alone[:, None] ** np.arange(2) * weights[:, None]
+        self._rest, counts = _quarter(part_differences, antennas - 1)
         self._weights = counts / symbols
         self._rest_features = features(self._rest)
 
@@ -87,12 +87,12 @@ class LatticeSum:
         return sums
 
 
-def _quarter(lattice: Real, antennas: int) -> tuple[Complex, Real]:
+def _quarter(part_differences: Real, antennas: int) -> tuple[Complex, Real]:
     """Return one of each four differences (k, N) that turns of 90° exchange, and their pairs (k,).
 
     Its first entry other than 0 is in the first quadrant; the zero difference is left out.
     """
-    values, pairs = lattice
+    values, pairs = part_differences
     parts = np.indices((len(values),) * 2 * antennas).reshape(antennas, 2, -1)
     real, imaginary = values[parts].swapaxes(0, 1)
     u = (real + 1j * imaginary).T
