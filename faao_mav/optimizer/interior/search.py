@@ -45,8 +45,8 @@ _FALL, _SOLVED = 0.2, 1.0
 mu. Measured on nine random plans with a least speed: with 3 and 10 mu one and four do not converge.
 """
 
-_MU_PER_TOLERANCE, _MOST_PER_SLOT = 1 / 20, 10.0
-"""The least mu, in tolerances; the inequalities per slot from which it is smaller. Chosen."""
+_LEAST_GAP = 0.25
+"""The complementarity gap per slot at the least mu, in tolerances. Chosen."""
 
 _STRICT = 1e-4
 """The tolerance that limits are kept to where a search asks for less: so much is what their
@@ -54,9 +54,6 @@ _STRICT = 1e-4
 
 _MOST_MISSED = 0.3
 """What a step may miss of a limit in second order, where its slack is less. Chosen."""
-
-_WIDEST = 1.0
-"""The change of velocity in one step, in v_max, that limits are modelled for. Chosen."""
 
 _LEFT = 0.1
 """The share of a linear slack that a half-plane which turns leaves at least, by a wider margin:
@@ -213,10 +210,8 @@ class Search:
             share = self._share(direction)
             if not self._accept(newton, direction, share):
                 share = share / 2 if self._accept(newton, direction, share / 2) else 0.0
-            # a step that is cut short by the model, or of shares to a saddle, is held back more
-            held_back = share * self._fastest(direction) > 0.99 * _WIDEST
-            held_back |= share < _SHORT and len(self.goal.held) > 0
-            if share == 0 or held_back:
+            # short steps of shares of the band lead to saddles: they are held back more
+            if share == 0 or (share < _SHORT and self.goal.held):
                 self.proximal = max(_MORE_PROXIMAL * self.proximal, _FIRST_PROXIMAL)
             elif fresh:
                 self.proximal = self.proximal / 4 if self.proximal > _FIRST_PROXIMAL else 0.0
@@ -232,12 +227,8 @@ class Search:
         it = self.iterate
         bent = np.abs(self.system.bent(it.at, direction.x))
         missed = float((bent / np.maximum(it.s, _MOST_MISSED)).max())
-        most = min(1 / np.sqrt(max(missed, TINY)), _WIDEST / max(self._fastest(direction), TINY))
+        most = 1 / np.sqrt(max(missed, TINY))
         return float(min(1.0, _TO_BOUNDARY * self._reach(direction), most))
-
-    def _fastest(self, direction: Direction) -> float:
-        """Return the largest change of a velocity, in v_max."""
-        return float(np.hypot(*direction.x[list(V)]).max())
 
     def _choose_mu(self, slope: float, ahead: Direction) -> None:
         """Choose mu by how far the direction `ahead` for mu = 0 reaches, or wait."""
@@ -249,8 +240,8 @@ class Search:
             now, reach = self._mean_gap(it.s, it.z), min(1.0, self._reach(ahead))
             left = self._mean_gap(it.s + reach * ahead.s, it.z + reach * ahead.z)
             self.mu = min(self.mu, max((left / now) ** 3, _SLOWEST) * now)
-        fewer = min(1.0, _MOST_PER_SLOT * it.at.x.shape[1] / len(it.s))
-        self.mu = max(self.mu, self.tolerance * _MU_PER_TOLERANCE * self.steepness * fewer)
+        per_slot = float(self.system.weight.sum()) / it.at.x.shape[1]
+        self.mu = max(self.mu, self.tolerance * _LEAST_GAP * self.steepness / per_slot)
 
     def _mean_gap(self, s: Real, z: Real) -> float:
         return float((s * z).sum() / self.system.weight.sum())
