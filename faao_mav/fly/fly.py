@@ -9,6 +9,7 @@ from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.record import FlightRecord
 from faao_mav.fly.seen import Flight, read_held
 from faao_mav.fly.start import Start
+from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import POSITION_RATE, Ending
 from faao_mav.fly.watch import Watch
 from faao_mav.validate.rule import Finding
@@ -52,12 +53,11 @@ def fly(
     """Watch the vehicle at `connection` fly the mission of `flight`, which it has to hold already.
 
     It is armed and started only with `arm`, and only where `preflight` finds no error; for
-    `elsewhere` and `untimed` see there. `lands` tells whether the flight ends on the ground: see
-    `Watch`. A flight that is `streamed` is armed and flown by setpoints, `rate` a second, instead
-    of its mission: see `Stream`, and what that raises. `rate` is also that of the positions
-    that it is asked for. `watching` is called after every step. `options` are those of
-    `LinkOptions`. Raises `LinkError` if there is no such vehicle, none that is known here, or its
-    mission cannot be read.
+    `elsewhere` and `untimed` see there. `lands` tells whether the flight ends on the ground. A
+    flight that is `streamed` is armed and flown by setpoints instead of its mission: see `Stream`,
+    and what that raises. `rate` is how many positions it is asked for a second. `watching` is
+    called after every step. Raises `LinkError` if there is no such vehicle, none that is known
+    here, or its mission cannot be read.
     """
     with Session(connection, options) as session:
         vehicle, peer = session.found, session.peer
@@ -71,31 +71,27 @@ def fly(
         for part, outcome in held.missing.items():
             if lists[part]:
                 raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
-        wrong = tuple(
+        wrong = [
             each
             for part in MissionType
             if lists[part]
             for each in held.other_than(lists[part], part, peer.vehicle)
-        )
+        ]
         if wrong:
-            return FlightReport(vehicle, wrong, None, FlightRecord.of(()))
-        ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
+            return FlightReport(vehicle, tuple(wrong), None, FlightRecord.of(()))
+        allowed = {"elsewhere": elsewhere, "untimed": untimed}
+        ready = Readiness(flight, held, peer, **allowed)
+        rows = held.lists[MissionType.MISSION]
         if flight.streamed and flight.solution is not None:
-            from faao_mav.fly.stream import Stream
-
             watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
+        elif arm:
+            watch = Start(peer, rows, ready, lands=lands, rate=rate)
         else:
-            rows = held.lists[MissionType.MISSION]
-            if arm:
-                watch = Start(peer, rows, ready, lands=lands, rate=rate)
-            else:
-                gate = ready if judged else None
-                watch = Watch(peer, rows, gate, lands=lands, rate=rate)
+            watch = Watch(peer, rows, ready if judged else None, lands=lands, rate=rate)
         watch.seen.strangers = session.link.strangers
         try:
-            ending = session.link.watch(
-                watch, lambda: watching(watch), beats=arm or flight.streamed
-            )
+            beats = isinstance(watch, Start)
+            ending = session.link.watch(watch, lambda: watching(watch), beats=beats)
         except LinkError as error:
             ending = Ending("lost", str(error))
     found = watch.findings or ()

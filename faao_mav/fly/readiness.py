@@ -11,20 +11,17 @@ from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.transfer.exchange import Peer
 
-_STEADY = 5
-"""Digits of a degree to which a place is looked at: a metre. Chosen."""
-
-_LOOK = 5.0
-"""Seconds after which it is told what stands against a flight, though its place is not known.
-Chosen."""
+_STEADY, _LOOK = 5, 5.0
+"""Digits of a degree to which a place is looked at, a metre; and seconds after which it is told
+what stands against a flight, though its place is not known. Chosen."""
 
 
 class Readiness:
     """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
 
-    For `elsewhere` and `untimed` see `preflight`. `findings` is what it found last, None before.
-    `begun` is when it was first heard, s. `judge` says what stands against it, now and then; before
-    the vehicle is armed `settle` reads it again, while `on` is given what arrives.
+    For what is `allowed` see `preflight`. `findings` is what it found last, None before; `begun` is
+    when the vehicle was first heard, s. `judge` looks now and then; before it is armed `settle`
+    reads it again, while `on` is given what arrives.
     """
 
     def __init__(
@@ -32,12 +29,10 @@ class Readiness:
         flight: Flight,
         held: Held,
         peer: Peer,
-        *,
-        elsewhere: bool = False,
-        untimed: bool = False,
+        **allowed: bool,
     ) -> None:
         self._flight, self._held, self._peer = flight, held, peer
-        self._options = {"elsewhere": elsewhere, "untimed": untimed}
+        self._allowed = allowed
         self.findings: tuple[Finding, ...] | None = None
         self._judged: Seen | None = None
         self._reading: Script[Held] | None = None
@@ -71,7 +66,7 @@ class Readiness:
         found = Seen(vehicle, self._held, place, seen.battery, *state, *others)
         if found != self._judged:
             self._judged = found
-            self.findings = preflight(self._flight, found, **self._options)
+            self.findings = preflight(self._flight, found, **self._allowed)
 
     def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
         """Return what is to be sent until the gate is up to date; None: `findings` is.

@@ -10,7 +10,7 @@ from faao_mav.errors import InputError
 from faao_mav.mission.item import Home, Mission
 from faao_mav.wire.machine import Machine, ask_for
 from faao_mav.wire.messages import HomePosition, WireItem
-from faao_mav.wire.parameters import Names, Reading, ReadParameters
+from faao_mav.wire.parameters import Reading, ReadParameters
 from faao_mav.wire.protocol import HOME_POSITION, MissionType
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.session import download_lists
@@ -56,15 +56,6 @@ class Held:
         return replace(mission, fence=held.fence, rally=held.rally)
 
 
-def names_of(vehicle: VehicleType) -> tuple[Names, ...]:
-    """Return the parameters of `vehicle` that a flight depends on, each with all of its names."""
-    flown = [tuple(each.names) for each in vehicle.parameters.values()]
-    decided = [(name,) for each in vehicle.failsafes for name in each.defaults]
-    rules = vehicle.family.setpoints
-    streamed = [(name,) for name in rules.defaults if vehicle.modes.guided is not None]
-    return tuple(dict.fromkeys([*flown, *decided, *streamed]))
-
-
 def read_held(
     peer: Peer,
     parts: Sequence[MissionType] = tuple(MissionType),
@@ -75,11 +66,16 @@ def read_held(
 
     That are the lists `parts`, and with `parameters` these and its home.
     """
-    assert peer.vehicle is not None
+    vehicle = peer.vehicle
+    assert vehicle is not None
     lists = yield from download_lists(parts, peer)
     if MissionType.MISSION in lists.missing or not parameters:
         return Held(lists.items, Reading({}), lists.missing)
-    reading: Reading = yield ReadParameters(peer, names_of(peer.vehicle))
+    names = [tuple(each.names) for each in vehicle.parameters.values()]
+    names += [(name,) for each in vehicle.failsafes for name in each.defaults]
+    if vehicle.modes.guided is not None:
+        names += [(name,) for name in vehicle.family.setpoints.defaults]
+    reading: Reading = yield ReadParameters(peer, tuple(dict.fromkeys(names)))
     told: list[HomePosition] = yield ask_for(peer.address, HOME_POSITION, HomePosition)
     try:
         home = home_in(told[0]) if told else None

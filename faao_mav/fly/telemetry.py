@@ -86,18 +86,14 @@ class Telemetry:
     Without `rows` its mission is not looked at. It is asked for `rate` positions a second. After
     `patience` seconds without any message nothing more can be known.
 
-    Attributes:
-        told: what has happened, in words, one after the other.
-        said: what the vehicle said that is a warning or worse.
-        fixes: where it was.
-        heartbeat, current, status, position: the last of these messages, None before the first.
-        knows_place: LOCAL_POSITION_NED was heard, which ArduPilot sends once its estimator knows
-            where it is.
-        wanted: the last CURRENT_MODE, None where the last heartbeat tells another mode.
-        place: where it is by `position`, metres above mean sea level; None: not known.
-        stations: other ground stations that were heard.
-        strangers: network addresses from which something else speaks in the vehicle's name.
-        ending: why nothing more can be known, None as long as something can.
+    `told` is what has happened and `said` what the vehicle said that is a warning or worse, in
+    words, `fixes` where it was; `heartbeat`, `current`, `status` and `position` are the last of
+    these messages, None before the first, `wanted` the last CURRENT_MODE, None where the last
+    heartbeat tells another mode. `knows_place`: LOCAL_POSITION_NED was heard, which ArduPilot sends
+    once its estimator knows where it is. `place` is where it is by `position`, m above the sea,
+    None where it does not tell. `stations` are other ground stations that were heard, `strangers`
+    addresses on the network from which something else speaks in its name. `ending` is why nothing
+    more can be known, None as long as something can.
     """
 
     def __init__(
