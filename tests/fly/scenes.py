@@ -20,6 +20,7 @@ from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
     CommandLong,
     Envelope,
+    GlobalPositionInt,
     Heartbeat,
     Message,
     MissionAck,
@@ -38,6 +39,9 @@ from faao_mav.wire.protocol import (
     MissionType,
 )
 from faao_mav.wire.wire_items import wire_items
+
+METRE = 1e7 / 111_319.5
+"""A metre of latitude in 1e-7 degrees."""
 
 
 def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
@@ -141,6 +145,19 @@ class Scene:
 
     def told(self, words: str) -> bool:
         return any(words in text for text in self.watch.seen.told)
+
+
+def during(
+    begin: float, end: float, change: Callable[[GlobalPositionInt], GlobalPositionInt]
+) -> Callable[[Message, float], Sequence[Message]]:
+    """Return a lens that has positions of some time changed."""
+
+    def lens(message: Message, now: float) -> Sequence[Message]:
+        if isinstance(message, GlobalPositionInt) and begin <= now < end:
+            return [change(message)]
+        return [message]
+
+    return lens
 
 
 def arms(message: object, wanted: float | None = None) -> bool:

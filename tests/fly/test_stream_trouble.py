@@ -1,13 +1,13 @@
 """Streams in trouble: no setpoint beyond the gate, and every end has its name."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import AnotherStation, Scene, starts
+from scenes import METRE, AnotherStation, Scene, during, starts
 from simulate import Station
 from stations import FOREIGN, HOME, a_mission, vehicle_of
 from test_gate import CAP, swift
@@ -26,9 +26,6 @@ from faao_mav.wire.messages import (
     SetPositionTargetLocalNed,
 )
 from faao_mav.wire.protocol import MavCommand
-
-METRE = 1e7 / 111_319.5
-"""A metre of latitude in 1e-7 degrees."""
 
 
 @dataclass
@@ -82,19 +79,6 @@ class Flown:
     def after(self, time: float) -> int:
         """Return how many setpoints it was sent after `time`, s."""
         return sum(each > time for each in self.times)
-
-
-def during(
-    begin: float, end: float, change: Callable[[GlobalPositionInt], GlobalPositionInt]
-) -> Callable[[Message, float], Sequence[Message]]:
-    """Return a lens that has positions of some time changed."""
-
-    def lens(message: Message, now: float) -> Sequence[Message]:
-        if isinstance(message, GlobalPositionInt) and begin <= now < end:
-            return [change(message)]
-        return [message]
-
-    return lens
 
 
 # ---- after a failsafe

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import numpy as np
 from conftest import FLYABLE, edited
-from scenes import AnotherStation, Scene, harmless
+from scenes import METRE, AnotherStation, Scene, arms, during, harmless
 from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted
 from test_gate import SWIFT, swift
@@ -23,7 +23,6 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import (
-    CommandLong,
     Envelope,
     GlobalPositionInt,
     Heartbeat,
@@ -33,9 +32,6 @@ from faao_mav.wire.messages import (
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand
 
 COMPANION = Address(1, 191)
-METRE = 1e7 / 111_319.5
-"""A metre of latitude in 1e-7 degrees."""
-
 LOST, PATIENCE = 400.0, 500.0
 """When the pilot lands what still flies, s, and when a flight without an end counts as one."""
 
@@ -168,8 +164,7 @@ class Judge(Counted):
             if harmless(message):
                 continue
             self._ordered, self._ordered_at = True, now
-            arms = isinstance(message, CommandLong) and message.command == MavCommand.ARM
-            if arms and message.param1 and not self.trial.may_start:  # type: ignore[attr-defined]
+            if arms(message, 1.0) and not self.trial.may_start:
                 self.wrong.append(f"{now:.1f} s: armed")
             if self._pilots:
                 self.wrong.append(f"{now:.1f} s: {type(message).__name__} to what a pilot has")
@@ -238,7 +233,7 @@ def flown(trial: Trial) -> Judged:
         *((LOST + wait, interrupt(judge)) for wait in (20.0, 30.0)),
     ]
     for name in trial.incidents:
-        INCIDENTS[name](scene, judge, random, events, others)
+        happens(name, scene, judge, random, events, others)
     stations = Station(judge, GROUND_STATION), Station(scene.mock, VEHICLE)
     simulate(*stations, trial.faults, PATIENCE, others=others, events=events)
     outcome = judge.outcome
@@ -259,105 +254,61 @@ def interrupt(judge: Judge) -> Callable[[float], None]:
     return cancelled
 
 
-Incident = Callable[[Scene, Judge, Random, list[Event], list[Station]], None]
-
-
-def _pilot(
-    scene: Scene, judge: Judge, random: Random, events: list[Event], others: list[Station]
+def happens(
+    name: str,
+    scene: Scene,
+    judge: Judge,
+    random: Random,
+    events: list[Event],
+    others: list[Station],
 ) -> None:
-    """A pilot takes it, may set the mode back, and lands it."""
-    begin = random.uniform(8.0, 100.0)
-    events.append((begin, scene.sets(LOITER)))
-    modes = scene.watch._modes
-    if random.random() < 0.5:
-        back = modes.mission if modes.guided is None or random.random() < 0.5 else modes.guided
-        events.append((begin + random.uniform(0.5, 20.0), scene.sets(back)))
-    events.append((begin + 60.0, scene.does(MavCommand.ARM, 0)))
+    """Let one incident happen, as `random` draws it."""
+    match name:
+        case "pilot":  # takes it, may set the mode back, and lands it
+            begin, modes = random.uniform(8.0, 100.0), scene.watch._modes
+            events.append((begin, scene.sets(LOITER)))
+            if random.random() < 0.5:
+                mission = modes.guided is None or random.random() < 0.5
+                back = modes.mission if mission else modes.guided
+                events.append((begin + random.uniform(0.5, 20.0), scene.sets(back)))
+            events.append((begin + 60.0, scene.does(MavCommand.ARM, 0)))
+        case "reboot":
+            events.append((random.uniform(5.0, 100.0), scene.mock.reboot))
+        case "interrupt":  # also while the link is silent, and perhaps a second one
+            silent = [begin + 0.5 for begin, _ in judge.trial.faults.outages]
+            begin = random.choice([random.uniform(1.0, 100.0), *silent])
+            events.append((begin, interrupt(judge)))
+            if random.random() < 0.5:
+                events.append((begin + random.uniform(0.5, 60.0), interrupt(judge)))
+        case "companion":
+            others.append(Station(Companion(), COMPANION))
+        case "station":
+            since = random.choice((0.0, 30.0, 50.0))
+            others.append(Station(AnotherStation(since=since), FOREIGN))
+        case _:  # other positions are told, for a while or for good
+            begin, changed = random.uniform(20.0, 100.0), change(name, random)
+            scene.tells(during(begin, begin + random.choice((2.0, 15.0, 1e9)), changed))
 
 
-def _reboot(
-    scene: Scene, judge: Judge, random: Random, events: list[Event], others: list[Station]
-) -> None:
-    events.append((random.uniform(5.0, 100.0), scene.mock.reboot))
+Change = Callable[[GlobalPositionInt], GlobalPositionInt]
 
 
-def _interrupt(
-    scene: Scene, judge: Judge, random: Random, events: list[Event], others: list[Station]
-) -> None:
-    """Ctrl-C, also while the link is silent, and perhaps a second one."""
-    silent = [begin + 0.5 for begin, _ in judge.trial.faults.outages]
-    begin = random.choice([random.uniform(1.0, 100.0), *silent])
-    events.append((begin, interrupt(judge)))
-    if random.random() < 0.5:
-        events.append((begin + random.uniform(0.5, 60.0), interrupt(judge)))
-
-
-def _companion(
-    scene: Scene, judge: Judge, random: Random, events: list[Event], others: list[Station]
-) -> None:
-    others.append(Station(Companion(), COMPANION))
-
-
-def _station(
-    scene: Scene, judge: Judge, random: Random, events: list[Event], others: list[Station]
-) -> None:
-    others.append(Station(AnotherStation(since=random.choice((0.0, 30.0, 50.0))), FOREIGN))
-
-
-def _told(
-    change: Callable[[Random], Callable[[GlobalPositionInt], GlobalPositionInt]],
-) -> Incident:
-    """Return an incident in which the vehicle tells other positions, for a while or for good."""
-
-    def happens(
-        scene: Scene, judge: Judge, random: Random, events: list[Event], others: list[Station]
-    ) -> None:
-        begin, changed = random.uniform(20.0, 100.0), change(random)
-        end = begin + random.choice((2.0, 15.0, 1e9))
-
-        def lens(message: Message, now: float) -> Sequence[Message]:
-            if isinstance(message, GlobalPositionInt) and begin <= now < end:
-                return [changed(message)]
-            return [message]
-
-        scene.tells(lens)
-
-    return happens
-
-
-def _home(random: Random) -> Callable[[GlobalPositionInt], GlobalPositionInt]:
-    risen = random.choice((-100_000, -5_000, 5_000, 100_000))
-    return lambda told: replace(told, relative_alt=told.relative_alt - risen)
-
-
-def _glitch(random: Random) -> Callable[[GlobalPositionInt], GlobalPositionInt]:
-    metres = random.choice((20.0, 100.0, 1000.0))
-    return lambda told: replace(told, lat=told.lat + round(metres * METRE))
-
-
-def _stuck(random: Random) -> Callable[[GlobalPositionInt], GlobalPositionInt]:
+def change(name: str, random: Random) -> Change:
+    """Return what becomes of positions: home moves, the place jumps, stands, or the clock leaps."""
     first: list[GlobalPositionInt] = []
 
     def stuck(told: GlobalPositionInt) -> GlobalPositionInt:
         first.append(told)
         return replace(first[0], time_boot_ms=told.time_boot_ms)
 
+    match name:
+        case "home":
+            risen = random.choice((-100_000, -5_000, 5_000, 100_000))
+            return lambda told: replace(told, relative_alt=told.relative_alt - risen)
+        case "glitch":
+            metres = random.choice((20.0, 100.0, 1000.0))
+            return lambda told: replace(told, lat=told.lat + round(metres * METRE))
+        case "leap":
+            leap = random.choice((-60_000, -1_000, 1_000, 20_000, 1_000_000))
+            return lambda told: replace(told, time_boot_ms=max(told.time_boot_ms + leap, 0))
     return stuck
-
-
-def _leap(random: Random) -> Callable[[GlobalPositionInt], GlobalPositionInt]:
-    leap = random.choice((-60_000, -1_000, 1_000, 20_000, 1_000_000))
-    return lambda told: replace(told, time_boot_ms=max(told.time_boot_ms + leap, 0))
-
-
-INCIDENTS: dict[str, Incident] = {
-    "pilot": _pilot,
-    "reboot": _reboot,
-    "interrupt": _interrupt,
-    "companion": _companion,
-    "station": _station,
-    "home": _told(_home),
-    "glitch": _told(_glitch),
-    "stuck": _told(_stuck),
-    "leap": _told(_leap),
-}
