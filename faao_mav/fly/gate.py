@@ -16,17 +16,14 @@ disturbs keeps its plan to 0.5 m rms in the simulators."""
 CLIMB = 2.0, 1.0
 """The speed, m/s, and acceleration, m/s², of a climb by setpoints; chosen: below all defaults."""
 
-_AROUND, _QUICKER = 2.0, 2.0
+_AROUND, _QUICKER, _BORNE = 2.0, 2.0, 3.0
 """A place may be so many metres farther from the last one than the aircraft flies meanwhile at so
-many times the plan's top speed. Chosen: a failsafe may fly faster than the plan, a wind carry it.
-"""
+many times the plan's top speed: a failsafe may fly faster than the plan, a wind carry it. Places
+are doubted for so many seconds until they are given up. Chosen."""
 
 _MOVES, _STANDS = 0.5, 1.0
 """An aircraft that tells at least so many m/s cannot be at the same place for so many seconds, to
 the last digit. Chosen."""
-
-_BORNE = 3.0
-"""Seconds for which places are doubted until they are given up; chosen."""
 
 
 class Gate:
@@ -70,10 +67,11 @@ class Gate:
         last = self._last
         if last is None or np.linalg.norm(velocity) < _MOVES or (place != last[1]).any():
             self._moved = t
-        if self._jumped_from is None and self._jumps(last, t, place):
-            self._jumped_from = last
-        elif self._jumps(last, t, place) and not self._jumps(self._jumped_from, t, place):
-            self._jumped_from = None
+        if self._jumps(last, t, place):
+            if self._jumped_from is None:
+                self._jumped_from = last
+            elif not self._jumps(self._jumped_from, t, place):
+                self._jumped_from = None
         self._last = t, place
         stands = t - self._moved >= _STANDS
         doubted = stands or self._jumped_from is not None

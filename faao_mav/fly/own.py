@@ -18,18 +18,14 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import Address
 
-_LOCAL_NED = 1
-"""MAV_FRAME_LOCAL_NED."""
+_LOCAL_NED, _NO_YAW = 1, 1 << 10 | 1 << 11
+"""MAV_FRAME_LOCAL_NED; and of POSITION_TARGET_TYPEMASK: yaw and yaw rate are ignored, all else
+counts."""
 
-_NO_YAW = 1 << 10 | 1 << 11
-"""POSITION_TARGET_TYPEMASK: yaw and yaw rate are ignored, all else counts."""
-
-_KEPT, _LONGEST = 9, 1.0
-"""How many round trips on the link are kept, one each half second, whose median counts; and the
-most that counts, s. Chosen."""
-
-_ANOTHER_CLOCK = 60.0
-"""From so many seconds of the world on a time is one of another clock than the answers'; chosen."""
+_KEPT, _LONGEST, _ANOTHER_CLOCK = 9, 1.0, 60.0
+"""How many round trips on the link are kept, one each half second, whose median counts; the most
+that counts, s; and from how many seconds of the world on a time is one of another clock than the
+answers'. Chosen."""
 
 
 class OwnClock:

@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.fly.course import Setpoint
-from faao_mav.fly.gate import Gate
+from faao_mav.fly.course import Setpoint, at_rest
+from faao_mav.fly.gate import LEVEL, Gate
 from faao_mav.fly.itinerary import Itinerary
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.readiness import Readiness
@@ -28,25 +27,18 @@ from faao_mav.wire.messages import (
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
 from faao_mav.wire.transfer.exchange import Peer
 
-_OFF_GROUND = 0.3
-"""Metres above home from which on a take-off is under way, though its answer is lost; chosen."""
+_OFF_GROUND, _SLOW_CLIMB = 0.3, 0.5
+"""Metres above home from which on a take-off is under way, though its answer is lost; and the least
+speed of that, m/s. Chosen: a third of the defaults."""
 
 _MODE_AGAIN, _TOLD_BY = 0.5, 3.0
 """Seconds between two messages about the mode that was asked for last; and seconds without one
 after which it counts as the pilot who changed the mode. Chosen."""
 
-_EARLY = 0.8
-"""The share of a period after which the next setpoint may go: they come irregularly; chosen."""
-
-_OLD = 1.0
-"""From so many seconds of the world on a position is too old to be answered by a setpoint: a link
-may have held it back. Chosen."""
-
-_SLOW_CLIMB = 0.5
-"""The least speed, m/s, at which it has to take off by itself; chosen: a third of the defaults."""
-
-_HOME_MOVED = 1.0
-"""Metres by which home has to rise or fall in flight to be told; chosen."""
+_EARLY, _OLD = 0.8, 1.0
+"""The share of a period after which the next setpoint may go, for they come irregularly; and from
+how many seconds of the world on a position is too old to be answered by one: a link may have held
+it back. Chosen."""
 
 _FAILSAFE = "it is in its failsafe, until setpoints come again"
 
@@ -56,12 +48,10 @@ class Stream(Start):
 
     `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
     where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
-    says. While nothing is heard of it nothing is sent, and it does what its parameters say. A mode
-    that was not asked for ends the setpoints for good, but for a failsafe in which the vehicle
-    still wants them, as PX4's CURRENT_MODE tells.
-
-    No setpoint is sent that does not pass the `Gate`, nor for a position that is old, or doubted.
-    An aircraft that cannot be led on is asked to hold.
+    says. Nothing is sent while nothing is heard of it, for a position that is old or doubted, nor
+    what does not pass the `Gate`. An aircraft that cannot be led on is asked to hold. A mode that
+    was not asked for ends the setpoints for good, but for a failsafe in which the vehicle still
+    wants them, as PX4's CURRENT_MODE tells.
 
     Raises `InputError` for a vehicle that is not flown by setpoints, and what `Itinerary` raises.
     """
@@ -205,20 +195,16 @@ class Stream(Start):
         for setpoints; while that is not known, nor is who flies it.
         """
         wanted, since = self.seen.wanted, self._unsure_since
-        flier: Literal["setpoints", "failsafe", "others"] = "others"
-        if mode == self._guided:
-            flier = "setpoints"
-        elif self._rules.comes_back_from(mode, self._readiness.values):
-            if wanted is None and (since is None or now <= since + _TOLD_BY):
-                self._unsure_since = now if since is None else since
-                return
-            if wanted is not None and wanted.intended_custom_mode == self._guided:
-                flier = "failsafe"
+        by_itself = self._rules.comes_back_from(mode, self._readiness.values)
+        if by_itself and wanted is None and (since is None or now <= since + _TOLD_BY):
+            self._unsure_since = since or now
+            return
         self._unsure_since = None
-        if flier == "others" and (self._armed or self.phase != "ending"):
+        if by_itself and wanted is not None and wanted.intended_custom_mode == self._guided:
+            if self.seen.told[-1] != _FAILSAFE:
+                self.seen.told.append(_FAILSAFE)
+        elif mode != self._guided and (self._armed or self.phase != "ending"):
             self._step_aside()
-        elif flier == "failsafe" and self.seen.told[-1] != _FAILSAFE:
-            self.seen.told.append(_FAILSAFE)
 
     def _repeat(self, now: float) -> Sequence[Message]:
         return () if self._unsure_since is not None else super()._repeat(now)
@@ -226,7 +212,7 @@ class Stream(Start):
     def _give_up(self, why: str, now: float) -> Sequence[Message]:
         """End the setpoints of an aircraft that cannot be led on: it is to hold."""
         self.seen.told.append(f"setpoints end: {why}")
-        if self._is_guided:
+        if self._mode == self._guided:
             return self._ask_to_hold(now)
         self._step_aside()
         return ()
@@ -249,12 +235,12 @@ class Stream(Start):
         if not believed:
             return ()
         risen = self._frame.risen(position)
-        if abs(risen) > _HOME_MOVED and not self._home_told:
+        if abs(risen) > LEVEL and not self._home_told:
             self._home_told = True
-            text = f"home is {risen:+.0f} m higher now: setpoints keep to that of the departure"
-            self.seen.told.append(text)
+            what = f"home is {risen:+.0f} m higher now"
+            self.seen.told.append(f"{what}: setpoints keep to that of the departure")
         out = list[Message]()
-        if self.phase == "flying" and self.flight.part == "over" and self._is_guided:
+        if self.phase == "flying" and self.flight.part == "over" and self._mode == self._guided:
             self.phase = "ending"
             out += self._set_mode(now, self._finish)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
@@ -268,15 +254,10 @@ class Stream(Start):
         kept = {**self._rules.defaults, **self._readiness.values}[self._rules.timeout]
         return kept / max(self._clock.speed, 1.0)
 
-    @property
-    def _is_guided(self) -> bool:
-        """Whether the mode is that for setpoints, as far as is known."""
-        return self.seen.heartbeat is None or self.seen.heartbeat.custom_mode == self._guided
-
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
         asked = self.phase == "ending" and self._order is not None
-        if self.phase == "flying" or (asked and self._is_guided):
+        if self.phase == "flying" or (asked and self._mode == self._guided):
             if self._unsure_since is not None:
                 return None
             lead = self._held + self._clock.lead
@@ -286,5 +267,5 @@ class Stream(Start):
             self.relay_start = self.flight.relay_start
             return setpoint
         if self._rules.takes_off_by_setpoints and self.phase in ("engaging", "arming"):
-            return Setpoint(place, np.zeros(3), np.zeros(3))
+            return at_rest(place)
         return None

@@ -52,11 +52,9 @@ _SLOW, _MISSED = 1.5, 3.0
 """A message is asked for again after so many seconds without one; positions also when they come
 with so many times the period between them. Chosen."""
 
-_FRESH = 3.0
-"""Seconds for which what was heard of the vehicle's state counts: three heartbeats. Chosen."""
-
-_READ_AGAIN = 1.0
-"""Seconds between two items that are read again; chosen."""
+_FRESH, _READ_AGAIN = 3.0, 1.0
+"""Seconds for which what was heard of the vehicle's state counts, three heartbeats, and between two
+items that are read again. Chosen."""
 
 _PROPULSION = (0, 1, 2)
 """MAV_BATTERY_FUNCTION of batteries that keep the aircraft in the air: unknown, all, propulsion."""

@@ -16,11 +16,9 @@ Phase: TypeAlias = Literal[
     "ending", "aside",
 ]  # fmt: skip
 
-_TICK = 0.5
-"""Seconds between two looks at what is due; chosen."""
-
-_REBOOT = 1.5
-"""Seconds in which a vehicle that is not armed any more can show that it has rebooted; chosen."""
+_TICK, _REBOOT = 0.5, 1.5
+"""Seconds between two looks at what is due, and in which a vehicle that is not armed any more can
+show that it has rebooted; chosen."""
 
 _LATE_NEWS = 3.0
 """Seconds after a change of mode in which the last item may still be told to be under way: then it
