@@ -14,7 +14,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.validate import Finding, Limits, validate
+from faao_mav.validate import Finding, Limits, ValidationContext, validate
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 FRAME = LocalFrame(HOME.latitude, HOME.longitude)
@@ -85,9 +85,8 @@ def main() -> None:
             findings: tuple[Finding, ...] = ()
             for _ in range(REPEATS):
                 started = time.perf_counter()
-                findings = validate(
-                    mission, vehicle, track=track, limits=Limits(max_altitude=120.0)
-                )
+                limits = Limits(max_altitude=120.0)
+                findings = validate(ValidationContext(mission, vehicle, track, limits))
                 best = min(best, time.perf_counter() - started)
             print(f"{autopilot:9} {name:16} {1000 * best:6.0f} ms, {len(findings)} findings")
 

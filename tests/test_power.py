@@ -15,7 +15,7 @@ from faao_mav.mission import Mission
 from faao_mav.plan import parse_plan
 from faao_mav.plan.energy import PowerOptions
 from faao_mav.power import FixedWing, PowerModel, RotaryWing
-from faao_mav.validate import Finding, validate
+from faao_mav.validate import Finding, ValidationContext, validate
 from faao_mav.validate.energy import EnergyUse, energy_use
 
 TABLE = cast("RotaryWing", PowerOptions().model(hovers=True))
@@ -141,7 +141,7 @@ def test_energy_is_the_integral_of_power() -> None:
 
 
 def findings(use: EnergyUse) -> list[Finding]:
-    every = validate(Mission(()), Vehicle(), energy=use)
+    every = validate(ValidationContext(Mission(()), Vehicle(), energy=use))
     return [finding for finding in every if finding.rule == "battery-tight"]
 
 

@@ -1,13 +1,10 @@
 """Whether an autopilot takes a mission, an aircraft can fly it, and it delivers the link."""
 
-from faao_mav.autopilot import Track, Vehicle
-from faao_mav.mission.item import Mission
 from faao_mav.validate import ardupilot, delivery, extent, fences, items, px4, speeds
 from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
 from faao_mav.validate.demands import Stretch as Stretch
-from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
@@ -23,31 +20,18 @@ _PLACE = {rule.id: n for n, rule in enumerate(RULES)}
 _WORST_FIRST = list(Level)
 
 
-def validate(
-    mission: Mission,
-    vehicle: Vehicle,
-    *,
-    track: Track | None = None,
-    limits: Limits | None = None,
-    link: LinkCheck | None = None,
-    airborne: bool = False,
-    energy: EnergyUse | None = None,
-) -> tuple[Finding, ...]:
-    """Return what all rules about `vehicle` find in `mission`, worst first, then by item.
+def validate(context: ValidationContext) -> tuple[Finding, ...]:
+    """Return what all rules about its vehicle find in `context`, worst first, then by item.
 
-    `track` is the predicted flight: with it speeds, heights, duration and fence are judged along
-    the flight as well as along the straights between the items. `limits` are what the flight must
-    stay within. `link` says what of a plan's rate the flight delivers. `airborne`: the mission is
-    begun in the air, and needs no take-off. `energy` is what the flight takes. Parameters of the
-    vehicle that are no use count as not given. Any mission can be judged, however odd; nothing is
-    raised.
+    Any mission can be judged, however odd; nothing is raised.
 
+    >>> from faao_mav.autopilot import Vehicle
     >>> from faao_mav.mission.item import Mission
-    >>> [finding.rule for finding in validate(Mission(()), Vehicle())]
+    >>> [finding.rule for finding in validate(ValidationContext(Mission(()), Vehicle()))]
     ['empty']
     """
-    context = ValidationContext(mission, vehicle, track, limits or Limits(), link, airborne, energy)
-    shown = {**_CONSTANTS, "vehicle": context.vehicle, "limits": context.limits, "link": link}
+    vehicle, limits, link = context.vehicle, context.limits, context.link
+    shown = {**_CONSTANTS, "vehicle": vehicle, "limits": limits, "link": link}
     found = []
     for name, index, values in (hit for module in _MODULES for hit in module.checks.hits(context)):
         rule = RULES[_PLACE[name]]

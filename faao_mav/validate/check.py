@@ -7,7 +7,7 @@ from faao_mav.autopilot import Track, Vehicle
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
-from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.validate import Finding, Level, Limits, LinkCheck, ValidationContext, validate
 from faao_mav.validate.energy import EnergyUse, energy_use
 
 if TYPE_CHECKING:
@@ -73,9 +73,8 @@ def check(
         link, prediction = compare_with_plan(solution, track)
         energy = energy_use(solution.plan, track, wind)
     airborne = solution is not None and not solution.plan.mission.takeoff
-    findings = validate(
-        mission, vehicle, track=track, limits=limits, link=link, airborne=airborne, energy=energy
-    )
+    beside = (track, limits or Limits(), link, airborne, energy)
+    findings = validate(ValidationContext(mission, vehicle, *beside))
     return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy, prediction)
 
 

@@ -31,9 +31,10 @@ LARGEST = float(np.finfo(np.float32).max)
 class ValidationContext:
     """A mission to judge; parameters of its vehicle that are no use count as not given.
 
-    `track` is how it is predicted to fly, if that is known; `link` what it is predicted to
-    deliver and `energy` what it takes, if there is a plan that tells. `airborne`: it is begun in
-    the air.
+    `track` is the predicted flight, if that is known: with it speeds, heights, duration and fence
+    are judged along the flight as well as along the straights between the items. `limits` are what
+    the flight must stay within; `link` says what of a plan's rate it delivers, and `energy` what it
+    takes. `airborne`: it is begun in the air, and needs no take-off.
     """
 
     mission: Mission

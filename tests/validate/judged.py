@@ -18,7 +18,7 @@ The words of a line, in any order but for the items, which are flown in theirs:
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan.energy import Battery
-from faao_mav.validate import Finding, Level, Limits, LinkCheck, validate
+from faao_mav.validate import Finding, Level, Limits, LinkCheck, ValidationContext, validate
 from faao_mav.validate.energy import EnergyUse
 
 HOME = Home(-35.363262, 149.165237, 584.0)
@@ -121,23 +121,11 @@ def track(
     return Track(*samples_of, np.array([items[0], *item]), reached, frame)
 
 
-@dataclass(frozen=True)
-class Given:
+class Given(ValidationContext):
     """What is judged."""
 
-    mission: Mission
-    vehicle: Vehicle = COPTER
-    track: Track | None = None
-    limits: Limits | None = None
-    link: LinkCheck | None = None
-    airborne: bool = False
-    energy: EnergyUse | None = None
-
-    def findings(self) -> tuple[Finding, ...]:
-        return validate(**vars(self))
-
     def by(self, rule: str) -> list[Finding]:
-        return [finding for finding in self.findings() if finding.rule == rule]
+        return [finding for finding in validate(self) if finding.rule == rule]
 
 
 _WORD = re.compile(r"(?:(\d+)\*)?([\w.-]+)(?:([:=@])([^/!]*)(?:/(\d+))?)?(!?)")
@@ -213,7 +201,7 @@ def given(line: str) -> Given:
 def check(rule: str, trips: Given, item: int | None, passes: Given) -> None:
     """Assert that `rule` speaks about `trips` at `item` and says nothing about `passes`."""
     found = trips.by(rule)
-    assert found, f"{rule} does not speak; {[finding.rule for finding in trips.findings()]} do"
+    assert found, f"{rule} does not speak; {[finding.rule for finding in validate(trips)]} do"
     assert found[0].item == item
     assert all(finding.message for finding in found)
     assert all(finding.action or finding.level is Level.NOTE for finding in found)

@@ -10,7 +10,7 @@ from judged import HOME, VEHICLES, track
 from faao_mav.mission.command import Command
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.validate import Limits, validate
+from faao_mav.validate import Limits, ValidationContext, validate
 
 odd = st.sampled_from([0.0, -0.0, math.nan, 1e-320, 1e300, -1e300, -1.0, 1.0, 2.7, 255.5, 65_536.0])
 values = st.one_of(odd, st.floats(-200, 200), st.floats(allow_infinity=False))
@@ -73,6 +73,7 @@ def test_any_mission_can_be_judged(mission: Mission, bare: bool, flown: bool) ->
     known = flight if flown and len(mission.items) >= 2 else None
     for vehicle in VEHICLES:
         judged = vehicle if bare else replace(vehicle, parameters=STRICT)
-        found = validate(mission, judged, track=known, limits=None if bare else LIMITS)
+        limits = Limits() if bare else LIMITS
+        found = validate(ValidationContext(mission, judged, known, limits))
         for finding in found:
             assert finding.item is None or 1 <= finding.item <= len(mission.items)

@@ -10,28 +10,23 @@ from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.straight import HOME
 
 
-def context(line: str) -> ValidationContext:
-    case = given(line)
-    return ValidationContext(case.mission, case.vehicle)
-
-
 def test_heights_count_from_home_in_every_frame() -> None:
     items = "waypoint:0,9,30 waypoint:0,9,614/0 waypoint:0,9,614/5 waypoint:0,9,30/6"
-    assert [place.up for place in context(items).places] == [30, 30, 30, 30]
-    homeless = [place.up for place in context(f"homeless {items}").places]
+    assert [place.up for place in given(items).places] == [30, 30, 30, 30]
+    homeless = [place.up for place in given(f"homeless {items}").places]
     assert [math.isnan(up) for up in homeless] == [False, True, True, False]
-    assert math.isnan(context("waypoint:0,9,30/10").places[0].up)
+    assert math.isnan(given("waypoint:0,9,30/10").places[0].up)
 
 
 def test_zero_zero_is_here_for_ardupilot_and_africa_for_px4() -> None:
-    case = context("waypoint:10,20,30 waypoint@0,0,15")
+    case = given("waypoint:10,20,30 waypoint@0,0,15")
     here = case.places[1]
     assert [here.east, here.north, here.up] == pytest.approx([10, 20, 15], abs=1e-6)
     assert len(ValidationContext(case.mission, PX4).places) == 1
 
 
 def test_legs_follow_items_jumps_and_the_way_home() -> None:
-    legs = context("takeoff waypoint:0,100,30 waypoint:100,100,30 jump=2,1 return").legs
+    legs = given("takeoff waypoint:0,100,30 waypoint:100,100,30 jump=2,1 return").legs
     assert [(leg.index, leg.start.index, leg.end.index, leg.jump) for leg in legs] == [
         (0, HOME, 0, False),
         (1, 0, 1, False),
@@ -59,12 +54,12 @@ def test_legs_follow_items_jumps_and_the_way_home() -> None:
     ],
 )
 def test_a_return_goes_where_the_vehicle_chooses(words: str, expected: tuple[float, float]) -> None:
-    back = context(f"{words} takeoff waypoint:0,200,30 return").legs[-1].end
+    back = given(f"{words} takeoff waypoint:0,200,30 return").legs[-1].end
     assert (back.east, back.north) == pytest.approx(expected, abs=0.1)
 
 
 def test_legs_lead_to_the_edge_of_circles() -> None:
-    to, away = context("takeoff loiter_turns:0,200,30,1,0,50 waypoint:200,200,30").legs[1:]
+    to, away = given("takeoff loiter_turns:0,200,30,1,0,50 waypoint:200,200,30").legs[1:]
     assert (to.end.east, to.end.north) == pytest.approx((0, 150), abs=0.1)
     assert (away.start.east, away.start.north) == pytest.approx((50, 200), abs=0.1)
 
@@ -82,7 +77,7 @@ def test_legs_lead_to_the_edge_of_circles() -> None:
     ],
 )
 def test_speeds_hold_from_change_to_change(words: str, expected: list[float]) -> None:
-    assert context(f"{words} waypoint:0,9,9").speeds == tuple(expected)
+    assert given(f"{words} waypoint:0,9,9").speeds == tuple(expected)
 
 
 def test_a_track_in_another_frame_is_the_same_track() -> None:
@@ -97,8 +92,8 @@ def test_a_track_in_another_frame_is_the_same_track() -> None:
 
 
 def test_without_home_the_first_place_is_the_origin() -> None:
-    case = context("homeless delay=1 waypoint:5,5,9")
+    case = given("homeless delay=1 waypoint:5,5,9")
     assert case.home is None
     assert case.frame == LocalFrame(*latlon(5, 5))
-    assert context("homeless delay=1").frame is None
-    assert context("").frame == FRAME
+    assert given("homeless delay=1").frame is None
+    assert given("").frame == FRAME

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from conftest import SMALL, edited
-from judged import LINK, VEHICLES, Given, check, flown, given
+from judged import COPTER, LINK, VEHICLES, Given, check, flown, given
 
 from faao_mav.autopilot.body import CopterBody
 from faao_mav.plan import Radio, parse_plan
@@ -41,7 +41,11 @@ def radio(**changes: float) -> Radio:
 )
 def test_a_doubtful_radio_is_told(trips: dict[str, float], passes: dict[str, float]) -> None:
     sides = [replace(LINK, radio=radio(**changes)) for changes in (trips, passes)]
-    check("radio-values", *(Given(flown(), link=sides[0]), None), Given(flown(), link=sides[1]))
+    check(
+        "radio-values",
+        *(Given(flown(), COPTER, link=sides[0]), None),
+        Given(flown(), COPTER, link=sides[1]),
+    )
 
 
 def test_a_doubtful_value_names_the_likely_slip() -> None:
@@ -61,13 +65,13 @@ def test_the_airframe_decides_what_leaning_gives() -> None:
 
 def test_what_was_lost_says_where() -> None:
     link = replace(LINK, predicted_delivered=0.5, worst=Stretch(30, 41, 0.05))
-    (found,) = Given(flown(), link=link).by("link-rate-reduced")
+    (found,) = Given(flown(), COPTER, link=link).by("link-rate-reduced")
     assert "25.0 %; 0.05 of it between 30 and 41 s" in found.message
 
 
 def test_of_a_plan_of_another_place_nothing_else_is_said() -> None:
     far = replace(LINK, path_error=7e6, away=7e6, rms_position_error=7e6, predicted_delivered=0.0)
-    assert [each.rule for each in Given(flown(), link=far).findings()] == ["link-elsewhere"]
+    assert [each.rule for each in validate(Given(flown(), COPTER, link=far))] == ["link-elsewhere"]
 
 
 def test_exchanged_coordinates_are_named() -> None:
@@ -95,7 +99,7 @@ ODD = (
 
 def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> None:
     for vehicle in VEHICLES:
-        found = validate(given(ODD).mission, vehicle)
+        found = validate(Given(given(ODD).mission, vehicle))
         other = "px4-" if vehicle.autopilot == "ardupilot" else "ardupilot-"
         assert found
         for finding in found:
@@ -106,7 +110,7 @@ def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> Non
 
 def test_worst_first_then_by_item() -> None:
     order = [Level.ERROR, Level.WARNING, Level.NOTE]
-    found = given("homeless waypoint:0,9,0 waypoint:0,9,9/1 change_speed=1,0,-1").findings()
+    found = validate(given("homeless waypoint:0,9,0 waypoint:0,9,9/1 change_speed=1,0,-1"))
     levels = [order.index(finding.level) for finding in found]
     assert levels == sorted(levels)
     assert len(set(levels)) == 3
@@ -117,9 +121,9 @@ def test_worst_first_then_by_item() -> None:
 def test_a_sound_mission_has_no_findings() -> None:
     way = "waypoint:0,100,30,6 waypoint:100,150,30 waypoint:200,160,30,10"
     for vehicle in ("copter", "px4"):
-        assert given(f"{vehicle} takeoff change_speed=1,8,-1 {way} return").findings() == ()
+        assert validate(given(f"{vehicle} takeoff change_speed=1,8,-1 {way} return")) == ()
 
 
 def test_parameters_that_are_no_numbers_count_as_not_given() -> None:
     line = "takeoff waypoint:0,9,9 return"
-    assert given(f"px4 GF_MAX_HOR_DIST=nan {line}").findings() == given(f"px4 {line}").findings()
+    assert validate(given(f"px4 GF_MAX_HOR_DIST=nan {line}")) == validate(given(f"px4 {line}"))

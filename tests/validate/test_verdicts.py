@@ -19,7 +19,7 @@ from faao_mav.errors import MissionFileError
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.validate import Finding, Level, validate
+from faao_mav.validate import Finding, Level, ValidationContext, validate
 
 DATA = Path(__file__).parent.parent / "data"
 CORPUS = DATA / "validate"
@@ -54,7 +54,7 @@ def test_each_file_gets_its_errors_and_warnings(row: list[str]) -> None:
     assert run.exit_code == (1 if json.loads(run.stdout)["errors"] else 0)
     pairs = [] if parameters == "-" else [pair.split("=") for pair in parameters.split()]
     vehicle = Vehicle(autopilot, kind, {name: float(value) for name, value in pairs})
-    found = validate(read_mission(CORPUS / name), vehicle)
+    found = validate(ValidationContext(read_mission(CORPUS / name), vehicle))
     rules = sorted({finding.rule for finding in found if finding.level is not Level.NOTE})
     assert rules == ([] if expected == "-" else expected.split())
 
@@ -65,7 +65,8 @@ def test_missions_that_were_flown_have_no_errors(autopilot: str) -> None:
     paths = sorted(folder.glob("*.waypoints"))
     assert paths
     for path in paths:
-        found = validate(read_mission_file(path).mission, Vehicle(autopilot, "copter"))
+        flown = read_mission_file(path).mission
+        found = validate(ValidationContext(flown, Vehicle(autopilot, "copter")))
         assert [finding for finding in found if finding.level is Level.ERROR] == [], path.name
 
 
@@ -102,7 +103,7 @@ def findings(name: str) -> tuple[Finding, ...]:
     corners = tuple((latitude, longitude) for latitude, longitude in recorded.get("fence", ()))
     fence = Fence((Polygon(corners, inclusion=True),)) if corners else Fence()
     vehicle = Vehicle(*VEHICLES[name.split("/")[0]], recorded["parameters"])
-    return validate(Mission(tuple(items), HOME, fence), vehicle)
+    return validate(ValidationContext(Mission(tuple(items), HOME, fence), vehicle))
 
 
 @pytest.mark.parametrize("name", RECORDED)
