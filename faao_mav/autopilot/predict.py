@@ -357,9 +357,10 @@ class _Walk:
 
     def _add(self, t: Real, position: Real, velocity: Real, item: Real) -> None:
         first = 1 if self.parts else 0  # the instant that the last part ended with
-        self.parts.append(
-            (t[first:] + self.clock, position[first:], velocity[first:], item[first:])
-        )
+        if len(t) > first:
+            self.parts.append(
+                (t[first:] + self.clock, position[first:], velocity[first:], item[first:])
+            )
 
     def _change_speed(self, item: MissionItem) -> None:
         change = self.vehicle.type.dialect.speed_change(item)
