@@ -31,7 +31,6 @@ class Timeouts:
 _GROWTH = 1.25
 """By how much the wait grows with each question that has to be put again; chosen."""
 
-
 _LONGEST = 0.5
 """The longest time after which a question is put again on a quick link, s; chosen."""
 

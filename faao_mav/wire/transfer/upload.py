@@ -34,11 +34,12 @@ class Upload(Exchange):
     """A machine that uploads `items`; the vehicle leads.
 
     - Any item below the count is sent whenever it is asked for, by either request, as
-      MISSION_ITEM_INT. PX4 and ArduPilot are sent it again when nothing follows, as it or the next
-      request was lost. PX4 passes over what it does not wait for, and acknowledges the last item
-      again: it is sent the next one too, but for the last one. If it refuses one of the two, it is
-      not known which: the upload begins anew without that. ArduPilot says INVALID_SEQUENCE of what
-      it has, and is sent the next item; it says ERROR of the last one.
+      MISSION_ITEM_INT. PX4 and ArduPilot are sent it again when nothing follows: it was lost, or
+      the request for the next one was.
+    - PX4 takes the item that it waits for and passes over any other, so it is sent the next one
+      too, whichever was lost, but never the last one unasked. If it refuses one of the two, it is
+      not known which: the upload begins anew, one item at a time.
+    - ArduPilot says INVALID_SEQUENCE of an item that it has, and is sent the next one.
     - An ERROR may be about a duplicate too (PX4: of MISSION_COUNT), and DENIED about a late request
       of a download before: they count when nothing more is asked for.
     - When everything was sent and no answer comes, the outcome is "unknown", and reading back must
