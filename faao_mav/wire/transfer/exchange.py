@@ -129,7 +129,6 @@ class Exchange(Machine[Outcome]):
 
     def start(self, now: float) -> Sequence[Message]:
         """Ask."""
-        self._result = None
         self._questions.clear()
         self._get_further(now)
         return self._ask(OPENING, now)
