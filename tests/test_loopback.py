@@ -18,7 +18,7 @@ from faao_mav.mission.item import Home
 from faao_mav.sim import MockAutopilot, behaviour_of
 
 HOME = Home(-35.363262, 149.165237, 584.0)
-SPEEDUP = 50.0
+SPEEDUP = 20.0
 
 SHORTER: dict[str, Any] = {
     "flight.start": [0, 60],
