@@ -77,6 +77,19 @@ def test_no_import_runs_upward() -> None:
     assert upward == []
 
 
+def test_what_knows_missions_and_autopilots_knows_no_radios_or_plans() -> None:
+    half = {"mission", "autopilot", "wire", "sim"}
+    ground = {"errors", "arrays", "vector", "files", "geodesy", "power", "processes"}
+    beyond = [
+        (name, other)
+        for name, others in all_imports().items()
+        for other in others
+        if name.split(".")[1:2] and name.split(".")[1] in half
+        if other.split(".")[1] not in half | ground
+    ]
+    assert beyond == []
+
+
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Not even for types, where Python itself would not mind."""
     try:
