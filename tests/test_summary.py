@@ -47,21 +47,6 @@ def test_a_prediction_that_no_flight_has_confirmed_says_so(
     assert "not compared" in result.as_dict()["predicted"]["assumption"]
 
 
-def test_the_first_line_is_for_who_flies(result: Result) -> None:
-    rate, duration = result.solution.delivered_rate, result.solution.plan.flight.duration
-    first = summary(result).splitlines()[0]
-    assert result.prediction is not None
-    kept = 100 * result.prediction.delivered_rate / rate
-    assert first == (
-        f"over the hill: delivers {rate:.4f} bit/s/Hz for {duration:g} s; the mission keeps "
-        f"{kept:.2f} % of it; 2 warnings"
-    )
-    plan = result.solution.plan.changed({"radio.bandwidth_mhz": 20, "name": ""})
-    told = summary(replace(result, solution=replace(result.solution, problem=build_problem(plan))))
-    megabytes = 20 * rate * duration / 8
-    assert told.startswith(f"delivers {megabytes:.4g} megabytes in {duration:g} s ({20 * rate:.4g}")
-
-
 def test_a_summary_of_a_flight_without_findings_is_short(result: Result) -> None:
     assert result.check is not None
     result = replace(result, check=replace(result.check, findings=()))
@@ -84,19 +69,6 @@ def test_the_summary_and_the_findings_tell_one_flight(result: Result) -> None:
     again = check(result.check.mission, result.check.vehicle, solution=result.solution).prediction
     assert again is not None
     assert again.rms_position_error == prediction.rms_position_error
-
-
-def test_it_says_what_was_found(result: Result) -> None:
-    text = summary(result, verbose=True)
-    average = result.solution.rates.R_avg
-    assert f"{average:.4f} bit/s/Hz, at most 2 by the alphabet" in text
-    assert "mutual information 1.800 +- 0.001, 1.700 delivered" in text
-    assert "more than by the plan" not in text
-    assert "3, from 1.0000 (user) to 1.5000 (bs-user) bit/s/Hz" in text
-    assert "within 50 % of the best that any route can do" in text
-    assert "(estimate)" in text
-    assert "converged after" in text
-    assert "none: give --out" in text
 
 
 def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) -> None:

@@ -13,7 +13,7 @@ from faao_mav import (
     read_mission,
     read_parameters,
 )
-from faao_mav.errors import FaaoError, InfeasibleError, InputError, MissionFileError
+from faao_mav.errors import FaaoError, InfeasibleError, InputError
 from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result, mission_files, optimize_plan
 
@@ -153,15 +153,6 @@ def test_parameters_of_an_earlier_mission_do_not_stay_beside_the_new_one(
     assert sorted(tmp_path.iterdir()) == sorted({*written, own})
     anew.write(tmp_path / "n.waypoints")
     assert own.read_text() == "WPNAV_SPEED,700\n"  # no run has written it
-
-
-@pytest.mark.parametrize("name", ["m.gpx", "absent/m.plan"])
-def test_a_mission_that_cannot_be_written_leaves_nothing(
-    result: Result, tmp_path: Path, name: str
-) -> None:
-    with pytest.raises((MissionFileError, InputError)):
-        result.write(tmp_path / name)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_flight_without_a_mission_is_a_result(too_many_items: Result, tmp_path: Path) -> None:
