@@ -64,7 +64,7 @@ class ClassSum:
     def _sums(self, z: Real, columns: int) -> Real:
         """Return the first `columns` of Σ_k weight_k e^-D_k [1, φ], (b, columns)."""
         if self._by_parts is not None:
-            return self._by_parts.sums(z)[:, :columns]
+            return self._by_parts.sums(z, columns)
         sums = np.zeros((len(z), columns))
         step = max(1, _BLOCK // min(_CLASSES, len(self._phi)))
         for first in range(0, len(self._phi), _CLASSES):

@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Flags, Integers, Real
+from faao_mav.arrays import Complex, Integers, Real
 
 Objective: TypeAlias = Callable[[Integers, Complex], tuple[Real, Complex]]
 """F (k,) and its gradient ∂F/∂Re Q + j ∂F/∂Im Q (k, q, N), of the channels with the given indices
@@ -26,6 +26,7 @@ of F by which such an optimum may be worse before it is improved."""
 
 _STEPS = 120  # steps at most
 _FIRST, _LONGEST = 0.2, 0.7  # the first and the longest step, radians on the sphere ||Q||_F = 1
+_SURE = 1e-4  # part of the predicted fall of F with which a step is taken
 _LEAST_REACH = 1e-6  # part of a step below which a refusal is due to rounding
 
 
@@ -38,11 +39,10 @@ def starting_points(gains: Real, antennas: int, random: int) -> Complex:
     b, q = gains.shape
     stream = np.arange(antennas)
     separate = np.eye(q, antennas, dtype=np.complex128)
-    spread = np.exp(2j * np.pi * np.outer(np.arange(q), stream) / antennas)
-    rotated = spread * np.exp(0.25j * np.pi * stream)
+    spread = np.exp(2j * np.pi * np.outer(np.arange(q), stream) / antennas + 0.25j * np.pi * stream)
     floor = np.maximum(gains, 0.03 * gains[:, :1])
     equalised = (gains[:, :1] / np.where(floor > 0.0, floor, 1.0))[:, :, None]
-    structured = (separate, spread, rotated, equalised * separate, equalised * rotated)
+    structured = (separate, spread, equalised * spread)
     starts = np.stack([unit(np.broadcast_to(M, (b, q, antennas))) for M in structured])
     # Symmetric points are stationary without being optima: none is hit exactly.
     parts = np.random.default_rng(7).standard_normal((2, 1 + random, 1, q, antennas))
@@ -116,47 +116,31 @@ def minimise(objective: Objective, Q: Complex, tolerance: float) -> tuple[Comple
     ([0.0, 1.0], [-4.0])
     """
     Q = unit(Q)
-    shape = Q.shape[1:]
-    best, F = Q.copy(), np.empty(len(Q))
-    index = np.arange(len(Q))
-    F, slope = objective(index, Q)
+    going = np.arange(len(Q))
+    F, slope = objective(going, Q)
     x, gradient, radial = _along(Q, slope)
-    m = x.shape[1]
     length = np.linalg.norm(gradient, axis=1)
-    inverse = np.eye(m) * (_FIRST / np.where(length > 0, length, 1.0))[:, None, None]
-    fresh, reach, value = np.ones(len(x), dtype=bool), np.ones(len(x)), F.copy()
-    for _ in range(_STEPS):
-        step = -(inverse @ gradient[:, :, None])[:, :, 0]
-        predicted = -0.5 * np.sum(step * gradient, axis=1)
-        going = (predicted > -0.5 * tolerance * radial) & (reach > _LEAST_REACH)
-        if not going.all():
-            index, x, gradient, radial, inverse = (
-                part[going] for part in (index, x, gradient, radial, inverse)
-            )
-            fresh, reach, value, step, predicted = (
-                part[going] for part in (fresh, reach, value, step, predicted)
-            )
-        if not len(index):
+    first = _FIRST / np.where(length > 0, length, 1.0)
+    inverse = np.eye(x.shape[1]) * first[:, None, None]
+    reach = np.ones(len(Q))
+    for number in range(_STEPS):
+        step = -(inverse[going] @ gradient[going, :, None])[:, :, 0]
+        predicted = -0.5 * np.sum(step * gradient[going], axis=1)
+        gains = predicted > -0.5 * tolerance * radial[going]
+        gains &= reach[going] > _LEAST_REACH
+        going, step, predicted = going[gains], step[gains], predicted[gains]
+        if not len(going):
             break
-        step *= (reach * np.minimum(1.0, _LONGEST / np.linalg.norm(step, axis=1)))[:, None]
-        trial = x + step
-        trial /= np.linalg.norm(trial, axis=1, keepdims=True)
-        reached, slope = objective(index, _matrices(trial, shape))
-        new_x, new_gradient, new_radial = _along(_matrices(trial, shape), slope)
-        s, y = new_x - x, new_gradient - gradient
-        _update(inverse, s, y, fresh)
-        better = reached < value - 1e-4 * reach * predicted
-        reach = np.where(better, np.minimum(1.0, 4 * reach), 0.25 * reach)
-        for old, new in (
-            (x, new_x),
-            (gradient, new_gradient),
-            (radial, new_radial),
-            (value, reached),
-        ):
-            old[better] = new[better]
-        F[index[better]] = value[better]
-        best[index[better]] = _matrices(x[better], shape)
-    return best, F
+        step *= np.minimum(1.0, _LONGEST / np.linalg.norm(step, axis=1))[:, None]
+        trial = unit(_matrices(x[going] + reach[going, None] * step, Q.shape[1:]))
+        reached, slope = objective(going, trial)
+        new = _along(trial, slope)
+        _update(inverse, going, new[0] - x[going], new[1] - gradient[going], scale=number == 0)
+        better = reached < F[going] - _SURE * reach[going] * predicted
+        reach[going] = np.where(better, np.minimum(1.0, 4 * reach[going]), 0.25 * reach[going])
+        at = going[better]
+        x[at], gradient[at], radial[at], F[at] = (part[better] for part in (*new, reached))
+    return _matrices(x, Q.shape[1:]), F
 
 
 def _along(Q: Complex, slope: Complex) -> tuple[Real, Real, Real]:
@@ -171,20 +155,18 @@ def _matrices(x: Real, shape: tuple[int, ...]) -> Complex:
     return (x[:, :half] + 1j * x[:, half:]).reshape(-1, *shape)
 
 
-def _update(inverse: Real, s: Real, y: Real, fresh: Flags) -> None:
-    """Correct the inverse Hessians (b, m, m) by what steps s (b, m) changed the gradients, y."""
-    curvature = np.sum(s * y, axis=1)
-    size = np.sum(y * y, axis=1)
-    bent = np.flatnonzero(curvature > 1e-10 * np.sqrt(np.sum(s * s, axis=1) * size))
-    s, y, curvature = s[bent], y[bent], curvature[bent]
-    first = fresh[bent]
-    inverse[bent[first]] = np.eye(s.shape[1]) * (curvature / size[bent])[first][:, None, None]
-    fresh[bent] = False
-    B = inverse[bent]
-    By = (B @ y[:, :, None])[:, :, 0]
-    rho = (1 / curvature)[:, None, None]
-    crossed = s[:, :, None] * By[:, None, :]
-    both = (1 + np.sum(y * By, axis=1) / curvature)[:, None, None]
-    inverse[bent] = (
-        B - rho * (crossed + crossed.swapaxes(1, 2)) + rho * both * (s[:, :, None] * s[:, None, :])
-    )
+def _update(inverse: Real, at: Integers, s: Real, y: Real, *, scale: bool) -> None:
+    """Correct the inverse Hessians of the points `at` by what steps s changed the gradients, y.
+
+    Those of the first step are begun with the size that it shows (`scale`). Where the gradient
+    falls along the step, nothing is learnt.
+    """
+    curvature, size = np.sum(s * y, axis=1), np.sum(y * y, axis=1)
+    bent = curvature > 1e-10 * np.sqrt(np.sum(s * s, axis=1) * size)
+    at, s, y, curvature, size = at[bent], s[bent], y[bent], curvature[bent], size[bent]
+    if scale:
+        inverse[at] = np.eye(s.shape[1]) * (curvature / size)[:, None, None]
+    By = (inverse[at] @ y[:, :, None])[:, :, 0]
+    both = (1 + np.sum(y * By, axis=1) / curvature)[:, None]
+    turn = s[:, :, None] * (0.5 * both * s - By)[:, None, :] / curvature[:, None, None]
+    inverse[at] += turn + turn.swapaxes(1, 2)

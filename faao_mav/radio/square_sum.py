@@ -30,7 +30,7 @@ class SquareSum:
     >>> from faao_mav.radio.constellation import difference_classes
     >>> classes = difference_classes("16qam", 2)
     >>> z = np.array([[1.0, 2.0, 0.3, -0.2]])
-    >>> s = np.log(SquareSum(classes.part_differences, 2, classes.symbols).sums(z)[:, 0])
+    >>> s = np.log(SquareSum(classes.part_differences, 2, classes.symbols).sums(z, 1)[:, 0])
     >>> bool(np.isclose(s, ClassSum(classes).value(z), rtol=1e-12))
     True
     """
@@ -47,13 +47,13 @@ class SquareSum:
         self._weights = counts / symbols
         self._rest_features = features(self._rest)
 
-    def sums(self, z: Real) -> Real:
-        """Return the sums, (b, 1 + N²), at z (b, N²)."""
+    def sums(self, z: Real, columns: int) -> Real:
+        """Return the first `columns`, 1 or 1 + N², of the sums, (b, columns), at z (b, N²)."""
         step = max(1, _BLOCK // (2 * self._squares.shape[1] * len(self._rest)))
         parts = (z[start : start + step] for start in range(0, max(1, len(z)), step))
-        return np.concatenate([self._block(part) for part in parts])
+        return np.concatenate([self._block(part, columns) for part in parts])
 
-    def _block(self, z: Real) -> Real:
+    def _block(self, z: Real, columns: int) -> Real:
         """Return the sums at few z (b, N²).
 
         Z is positive semidefinite, |Z_1j|² <= Z_11 Z_jj: however weak the first stream is, no term
@@ -71,16 +71,18 @@ class SquareSum:
         # Z_11 (u + w)² of either part of u_1, by powers of it.
         D = np.stack([-inverse * row**2, -2.0 * row, np.broadcast_to(-own, row.shape)])
         D = self._squares.T @ D.reshape(3, -1)
-        moments = self._powers @ np.exp(D, out=D)
-        x, y = moments.reshape(3, *row.shape).swapaxes(0, 1)
+        moments = self._powers[: min(3, columns)] @ np.exp(D, out=D)
+        x, y = moments.reshape(len(moments), *row.shape).swapaxes(0, 1)
         schur = z[:, among] - inverse * coordinates(Z_1r.conj()[:, :, None] * Z_1r[:, None, :])
         x *= np.exp(-(schur @ self._rest_features.T)) * self._weights
 
         near = np.exp(-own * self._alone) @ self._alone_terms
         total = x[0] * y[0]
-        with_first = 2.0 * ((x[1] * y[0] + 1j * x[0] * y[1]) @ self._rest.conj())
-        sums = np.empty((len(z), 1 + N * N))
+        sums = np.empty((len(z), columns))
         sums[:, 0] = np.sum(total, axis=1) + near[:, 0]
+        if columns == 1:
+            return sums
+        with_first = 2.0 * ((x[1] * y[0] + 1j * x[0] * y[1]) @ self._rest.conj())
         sums[:, 1] = np.sum(x[2] * y[0] + x[0] * y[2], axis=1) + near[:, 1]
         sums[:, 1 + first], sums[:, 1 + first + pairs] = with_first.real, with_first.imag
         sums[:, 1 + among] = total @ self._rest_features
