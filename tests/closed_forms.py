@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.arrays import Real, RealOrComplex
 from faao_mav.radio.constellation import DifferenceClasses, difference_classes
 from faao_mav.radio.rate import exponents
 
@@ -32,14 +32,3 @@ def log_sum(H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float = 
     """Return ``log_nonzero_sum`` of channels H and precoders P."""
     classes = difference_classes(modulation, P.shape[-1])
     return log_nonzero_sum(exponents(H, P, classes.vectors, noise), classes)
-
-
-def mean_log_sum(draws: Complex, P: Complex, modulation: str) -> Real:
-    """Return ``log_sum`` for the mean rate over the draws (..., S, N_r, N_t) of P (..., N, N)."""
-    s = log_sum(draws, P[..., None, :, :], modulation)
-    deficits = np.where(s < -36.0, s, np.log(np.logaddexp(0.0, np.maximum(s, -36.0))))
-    top = np.max(deficits, axis=-1)
-    mean = np.log(np.mean(np.exp(deficits - top[..., None]), axis=-1)) + top
-    return np.asarray(
-        np.where(mean < -36.0, mean, np.log(np.expm1(np.exp(np.maximum(mean, -36.0)))))
-    )

@@ -135,11 +135,6 @@ def test_swapping_the_stations_swaps_the_rates(faint_plan: MakePlan) -> None:
     assert other.w[::-1] == pytest.approx(one.w, abs=1.0)
 
 
-def test_a_symmetric_plan_has_equal_rates(faint_plan: MakePlan) -> None:
-    rates = optimize(faint_plan({"radio.fading": "none"})).rates
-    assert rates.R_U == pytest.approx(rates.R_G, abs=1e-4)
-
-
 @pytest.mark.parametrize(
     ("scheme", "fading"),
     [
