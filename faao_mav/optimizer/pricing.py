@@ -46,7 +46,6 @@ _FEW_CLASSES = 1000  # ... or more classes of differences than this; chosen
 
 _MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
 _SPARE_ERROR = 0.001  # error of the spare power, dB: it is printed to 0.1. Chosen
-_FIRST_SPARE_DB = 5.0  # spare power that is tried first, then twice that; chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,33 +127,23 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
 
 @dataclass(frozen=True, slots=True)
 class FreshRates:
-    """R_U, R_G and R_del on draws that the plan does not know, and standard errors, bit/s/Hz."""
+    """Rates on draws that the plan does not know, and their standard errors, bit/s/Hz.
 
-    bs_uav: float
-    uav_user: float
+    `average` is the smaller of R_U and R_G, as in (9), `delivered` is R_del.
+    """
+
+    average: float
+    error: float
     delivered: float
-    bs_uav_error: float
-    uav_user_error: float
     delivered_error: float
-
-    @property
-    def average(self) -> float:
-        """The smaller of the two rates, as in (9), bit/s/Hz."""
-        return min(self.bs_uav, self.uav_user)
-
-    @property
-    def error(self) -> float:
-        """The standard error of the smaller of the two rates, bit/s/Hz."""
-        return self.bs_uav_error if self.bs_uav <= self.uav_user else self.uav_user_error
 
 
 def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
     Every slot has draws of its own, or where that takes long (large alphabets, many slots, searches
-    for precoders that know the draw) every so many slots. What is delivered is
-    the mean over flights that have one of the draws in each slot, forwarded with the planned
-    shares.
+    for precoders that know the draw) every so many slots. What is delivered is the mean over
+    flights that have one of the draws in each slot, forwarded with the planned shares.
     """
     problem, how = solution.problem, design(solution.plan)
     if not how.averaged:
@@ -178,7 +167,6 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
         # one draw per slot only the spread over all slots is known, an upper estimate.
         spread = at.var(axis=0, ddof=1).mean() if draws > 1 else at.var(ddof=1)
         found.append((float(at.mean()), float(np.sqrt(spread / at.size))))
-    (bs_uav, first), (uav_user, second) = found
     # each chosen slot stands for those about it
     nearest = np.minimum(np.arange(slots) // step, len(chosen) - 1)
     delivered = [
@@ -187,9 +175,9 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
         ).rate
         for I_U, I_G in zip(*rates, strict=True)
     ]
-    error = np.std(delivered, ddof=1) / np.sqrt(draws) if draws > 1 else max(first, second)
-    mean = float(np.mean(delivered))
-    return FreshRates(bs_uav, uav_user, mean, first, second, float(error))
+    larger = max(error for _, error in found)
+    error = float(np.std(delivered, ddof=1) / np.sqrt(draws)) if draws > 1 else larger
+    return FreshRates(*min(found), float(np.mean(delivered)), error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,8 +205,8 @@ def saturation(solution: Solution) -> Saturation:
     full = [np.full(len(solution.w), float(link.classes.bits)) for link in problem.links]
 
     def maximised(I_U: Real, I_G: Real, shares: Real | None) -> float:
-        if solution.plan.radio.causal:
-            return problem.relay.relayed(I_U, I_G, problem.kinematics.time_step, shares).rate
+        if (queue := problem.maximised_queue) is not None:
+            return queue.relayed(I_U, I_G, problem.kinematics.time_step, shares).rate
         return float(min(I_U.mean(), I_G.mean()))
 
     ceiling = maximised(full[0], full[1], None)
@@ -229,9 +217,7 @@ def saturation(solution: Solution) -> Saturation:
 
     if maximised(solution.I_U, solution.I_G, solution.shares) < SATURATED * ceiling:
         return Saturation(ceiling, 0.0)
-    low, high = 0.0, _FIRST_SPARE_DB
-    while high < _MAX_SPARE_DB and enough(high):
-        low, high = high, min(2 * high, _MAX_SPARE_DB)
+    low, high = 0.0, _MAX_SPARE_DB
     while high - low > _SPARE_ERROR:
         middle = (low + high) / 2
         low, high = (middle, high) if enough(middle) else (low, middle)

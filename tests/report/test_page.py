@@ -112,7 +112,7 @@ def test_what_the_plan_is_worth_by_other_measures() -> None:
     result = Result(
         solution=solution,
         information=MutualInformation(1.9, 1.8, 1.7, 0.004),
-        fresh=FreshRates(1.7, 1.6, 1.5, 0.01, 0.02, 0.03),
+        fresh=FreshRates(1.6, 0.02, 1.5, 0.03),
         saturation=Saturation(2.0, 3.2),
         bound=Bound(1.95, exact=False),
     )
