@@ -14,8 +14,8 @@ from faao_mav.optimizer.interior.maximize import objectives
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.search.axis_bound import AxisBound, axis_bound
-from faao_mav.optimizer.search.bound import radial_rates, upper_bound
+from faao_mav.optimizer.search.axis_bound import AxisBound
+from faao_mav.optimizer.search.bound import radial_rates
 from faao_mav.plan import parse_plan
 
 FREE = {
@@ -72,18 +72,6 @@ def test_every_step_of_a_flight_is_in_reach(
         assert (parts <= away + 1e-6).all(axis=1).any()
 
 
-def test_flights_beyond_the_ends_of_the_axis_come_back(bounded: dict[str, AxisBound]) -> None:
-    cells = bounded["fast"]
-    middle, fastest = len(cells.columns) // 2, len(cells.columns) - 1
-    values = np.full((1, len(cells.columns), len(cells.x)), -np.inf)
-    values[0, fastest, 1] = 1.0  # at v_max, just inside: it was beyond the first row before
-    assert cells.reached(values, 1)[0, fastest, 0] == 1.0
-    values[:] = -np.inf
-    values[0, 0, 0] = 2.0  # beyond the first row, on its way out
-    assert cells.reached(values, 1)[0, 0, 1] == 2.0
-    assert cells.reached(values, 1)[0, middle, 1] == -np.inf
-
-
 @pytest.fixture(scope="module")
 def limits(bounded: dict[str, AxisBound]) -> dict[str, float]:
     return {kind: cells.bound([0.4, 0.5, 0.6]) for kind, cells in bounded.items()}
@@ -130,10 +118,3 @@ def test_flights_may_have_few_instants(
     cells = AxisBound(one.problem, one.rates, one.speeds, one.parts)
     assert len(cells.times[0]) == instants
     assert optimize(one.problem.plan).rates.R_avg <= cells.bound([0.5])
-
-
-def test_the_price_sought_is_better_than_others(bounded: dict[str, AxisBound]) -> None:
-    cells = bounded["fast"]
-    found = axis_bound(cells.problem, cells.rates, coarse=3, fine=6)
-    assert found <= min(cells.bound([price]) for price in (0.3, 0.7))
-    assert upper_bound(cells.problem).value <= found

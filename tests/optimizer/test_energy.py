@@ -3,28 +3,19 @@
 import math
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from certificate import still_gained
 from random_flights import random_flight
-from scipy.optimize import minimize
 
-from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import ENERGY_SHARE
-from faao_mav.optimizer.interior.energy import EnergyLimit
-from faao_mav.optimizer.interior.maximize import constraints_of, maximize
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.most_data import WithinEnergy
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.search.sparing import sparing_starts
-from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.report.summary import result_lines
@@ -85,102 +76,6 @@ def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float, seed:
     problem = build_problem(plan)
     flight = random_flight(problem.kinematics, seed)
     assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
-
-
-def limited(plan: Plan, share: float) -> tuple[Kinematics, Any, EnergyLimit, Trajectory]:
-    """The kinematics, rates and energy limit of `plan`: a share of what the best flight takes."""
-    problem = build_problem(plan)
-    kin, field = problem.kinematics, rate_field(problem, design(plan))
-    free = maximize(kin, field, straight_flight(kin), tolerance=1e-6, max_iterations=400)
-    energy = problem.energy_of(free.trajectory)
-    assert energy is not None
-    (limit,) = replace(problem, energy=share * energy).constraints(kin)
-    assert isinstance(limit, EnergyLimit)
-    return kin, field, limit, free.trajectory
-
-
-def slsqp(kin: Kinematics, field: Any, limit: EnergyLimit, start: Trajectory) -> float:
-    """The best min_j F_j that SLSQP finds from `start`, with gradients by the accelerations x."""
-    n, dt = kin.slots, kin.time_step
-    to_v = dt * np.tril(np.ones((n, n - 1)), -1)
-    to_w = np.zeros((n, n - 1))
-    to_w[1:] = dt * np.cumsum((to_v[:-1] + to_v[1:]) / 2, axis=0)
-
-    def flight(x: Real) -> tuple[Real, Real, Real]:
-        a = x[:-1].reshape(-1, 2)
-        return kin.start + to_w @ a, to_v @ a, a
-
-    def by_x(by_w: Real, by_v: Real) -> Real:
-        """Gradients (m, 2 (n - 1) + 1) by x of those by w and v, (m, n, 2)."""
-        by_a = np.einsum("mnc,nk->mkc", by_w, to_w) + np.einsum("mnc,nk->mkc", by_v, to_v)
-        return np.hstack([by_a.reshape(len(by_a), -1), np.zeros((len(by_a), 1))])
-
-    def kept(x: Real) -> Real:
-        w, v, a = flight(x)
-        energy = dt * limit.partials(v.T, 0 * v.T).value.sum()
-        return np.concatenate([
-            1 - (v**2).sum(axis=1) / kin.max_speed**2,
-            1 - (a**2).sum(axis=1) / kin.max_acceleration**2,
-            field.value(w.T[:, None]).mean(axis=-1)[:, 0] - x[-1],
-            [1 - energy / limit.most],
-        ])  # fmt: skip
-
-    def kept_gradients(x: Real) -> Real:
-        w, v, a = flight(x)
-        each = np.eye(n)[:, :, None]
-        speed = by_x(0 * each * v, -2 * each * v / kin.max_speed**2)
-        acceleration = np.zeros((n - 1, len(x)))
-        for k, part in enumerate(a):
-            acceleration[k, 2 * k : 2 * k + 2] = -2 * part / kin.max_acceleration**2
-        slopes = np.moveaxis(field(w.T[:, None]).gradient[:, :, 0], 0, -1) / n
-        rates = by_x(slopes, 0 * slopes)
-        rates[:, -1] = -1
-        power = limit.partials(v.T, 0 * v.T).by_v.T[None]
-        energy = by_x(0 * power, -dt / limit.most * power)
-        return np.vstack([speed, acceleration, rates, energy])
-
-    def ends(x: Real) -> Real:
-        w, v, _ = flight(x)
-        return np.concatenate([(w[-1] - kin.end) / 100, v[-1] / 10])
-
-    last = [*(to_w[-1] / 100, to_v[-1] / 10)]
-    end_gradients = np.vstack([np.hstack([np.kron(row, np.eye(2)), [[0], [0]]]) for row in last])
-    t = field.value(start.w.T[:, None]).mean(axis=-1).min()
-    constraints = [
-        {"type": "ineq", "fun": kept, "jac": kept_gradients},
-        {"type": "eq", "fun": ends, "jac": lambda _: end_gradients},
-    ]
-    told = {"maxiter": 300, "ftol": 1e-9}
-    found = minimize(  # type: ignore[call-overload]
-        lambda x: -float(x[-1]),
-        np.append(start.a[:-1].ravel(), t),
-        jac=lambda x: np.append(np.zeros(len(x) - 1), -1.0),
-        constraints=constraints,
-        method="SLSQP",
-        options=told,
-    )
-    sound = kept(found.x).min() > -1e-6 and abs(ends(found.x)).max() < 1e-6
-    return float(found.x[-1]) if sound else -math.inf
-
-
-@pytest.mark.parametrize("share", [0.97, 0.94])
-def test_no_worse_than_slsqp(share: float) -> None:
-    plan = COPTER.changed({"flight.duration": 20, "radio.causal": False})
-    kin, field, limit, free = limited(plan, share)
-    every = (*constraints_of(kin), limit)
-    starts = sparing_starts(kin, {"straight": straight_flight(kin), "free": free}, every)
-    ours = [
-        maximize(kin, field, each, constraints=[limit], tolerance=1e-6, max_iterations=400)
-        for each in starts.values()
-    ]
-    assert ours
-    best = max(ours, key=lambda each: each.value)
-    assert best.converged
-    assert max(kin.residuals(best.trajectory).values()) < 1e-6
-    assert limit.used(best.trajectory) <= limit.most * (1 + 1e-9)
-    assert limit.used(best.trajectory) >= limit.most * (1 - 1e-3)  # nothing is left lying
-    peers = [slsqp(kin, field, limit, each) for each in (*starts.values(), best.trajectory)]
-    assert best.value >= max(peers) - 1e-4
 
 
 def within(energy_wh: float) -> Solution:

@@ -10,7 +10,6 @@ import pytest
 from certificate import kkt_residual
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import minimize
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.chain import Chain
@@ -263,48 +262,6 @@ def test_concave_rewards_reach_the_global_optimum(make: Callable[..., Kinematics
     problem = cp.Problem(cp.Maximize(cp.minimum(*gains)), flight.constraints)
     problem.solve(solver=cp.CLARABEL)
     assert best.value == pytest.approx(float(problem.value), rel=2e-5)
-
-
-@pytest.mark.parametrize("law", [bpsk, gaussian])
-def test_a_small_problem_agrees_with_slsqp(law: Law) -> None:
-    """Ten slots, non-concave: both climb from the same start to the same optimum."""
-    stage = links(law, 4e4, 6e4)
-    kin = plane(
-        0, slots=10, time_step=4.0, max_speed=40.0, max_acceleration=4.0, end_velocity=np.zeros(2)
-    )
-    start = straight_flight(kin)
-    best = maximize(kin, stage, start, tolerance=1e-8)
-    n, k = kin.slots, kin.first_bounded_acceleration
-
-    def flown(x: Real) -> Trajectory:
-        a = np.vstack([x[2:].reshape(-1, 2), np.zeros(2)])
-        v = x[:2] + kin.time_step * np.vstack([np.zeros(2), np.cumsum(a[:-1], axis=0)])
-        w = kin.start + kin.time_step * np.vstack(
-            [np.zeros(2), np.cumsum((v[:-1] + v[1:]) / 2, axis=0)]
-        )
-        return Trajectory(w, v, a)
-
-    def room(x: Real) -> Real:
-        flight = flown(x[:-1])
-        return np.concatenate(
-            [
-                1 - (flight.v**2).sum(axis=1) / kin.max_speed**2,
-                1 - (flight.a[k : n - 1] ** 2).sum(axis=1) / kin.max_acceleration**2,
-                stage(flight.w.T).value.mean(axis=1) - x[-1],
-            ]
-        )
-
-    def ends(x: Real) -> Real:
-        flight = flown(x[:-1])
-        return np.concatenate([(flight.w[-1] - kin.end) / 100, flight.v[-1]])
-
-    x: Any = np.concatenate([start.v[0], start.a[:-1].ravel(), [reward(stage, start)]])
-    limits: Any = [{"type": "ineq", "fun": room}, {"type": "eq", "fun": ends}]
-    least: Any = minimize  # its stubs know no constraints of arrays
-    how = {"method": "SLSQP", "constraints": limits, "options": {"maxiter": 500}, "tol": 1e-12}
-    peer = least(lambda x: float(-x[-1]), x, **how)
-    assert peer.success
-    assert best.value == pytest.approx(float(peer.x[-1]), rel=1e-5)
 
 
 @pytest.mark.figures

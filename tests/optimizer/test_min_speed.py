@@ -78,26 +78,11 @@ def test_free_ends_always_have_a_start(seconds: float, least: float, step: float
         assert worst(k, straight_flight(k)) < 1e-9
 
 
-def test_a_least_speed_that_the_straight_line_keeps_changes_nothing_in_the_start() -> None:
-    slow, any_speed = cruiser(50, 5.0), cruiser(50, 0.0)
-    assert straight_flight(slow).w == pytest.approx(straight_flight(any_speed).w, abs=1e-9)
-
-
 def test_it_circles_at_the_stations() -> None:
     kin = cruiser(400, 10.0)
     flight = starts(kin, ["bs-user"], PLACES)["bs-user"]
     for place in PLACES.values():
         assert (np.linalg.norm(flight.w - place, axis=1) < 60).sum() > 100
-
-
-@pytest.mark.parametrize("ends", [(30.0, None), (None, 200.0), (30.0, 210.0)])
-def test_back_to_the_start_is_no_refusal_where_a_circle_does(
-    ends: tuple[float | None, float | None],
-) -> None:
-    velocities = [None if degrees is None else heading(14.0, degrees) for degrees in ends]
-    kin = cruiser(60, 12.0, start_velocity=velocities[0], end_velocity=velocities[1])
-    kin = replace(kin, end=kin.start)
-    assert worst(kin, straight_flight(kin)) < 1e-8
 
 
 @given(
