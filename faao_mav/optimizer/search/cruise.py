@@ -12,6 +12,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.interior.constraint import every_excess
+from faao_mav.optimizer.interior.maximize import constraints_of
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.track import MOST_STEPS, nearest_flight
 from faao_mav.optimizer.search.turning import turning_curves
@@ -37,7 +39,7 @@ is the curve itself has no gradient there."""
 
 
 def cruise(kin: Kinematics) -> Trajectory:
-    """Return a feasible flight that weaves towards w_F, circles on the way or turns otherwise.
+    """Return a feasible flight whose turn rate is constant piece by piece, or one near to that.
 
     Raises:
         InfeasibleError: none was found, which is no proof that there is none.
@@ -67,14 +69,9 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
     near: list[tuple[float, int, Trajectory]] = []
     for v in curves:
         flight = kin.follow(v)
-        missed = kin.residuals(flight)
-        if max(missed.values()) < _TOLERANCE:
+        if max(kin.residuals(flight).values()) < _TOLERANCE:
             return flight
-        speed = max(missed["(13e) speed"], missed["minimum speed"]) / kin.max_speed
-        changing = max(missed["(13f) acceleration"], missed.get("turn", 0)) / kin.max_acceleration
-        changing += missed.get("fall of airspeed", 0) / kin.most_fall
-        changing += missed.get("power of airspeed", 0) / kin.most_power
-        near.append((speed + changing, len(near), flight))
+        near.append((every_excess(kin, constraints_of(kin), flight), len(near), flight))
     for steps, (_, _, flight) in product((_FEW_STEPS, MOST_STEPS), sorted(near)[:_REPAIRS]):
         drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
         repaired = nearest_flight(kin, drawn_in, flight, steps=steps, first=True)

@@ -84,15 +84,8 @@ def improve_starts(
     one does. No coarse copy is used for short flights, for those with a least speed (the copy
     cannot make their turns), and for a single start, which needs no comparison.
 
-    Args:
-        kin: the feasible set.
-        stage: the rewards of the slots.
-        flights: the starts by name.
-        tolerance: relative tolerance of the search, at least 3e-3 on a coarse copy.
-        max_iterations: steps of each search at most.
-        relay: the queue whose delivered rate is maximised instead of the smaller mean.
-        constraints: what flights of given kinematics keep beside their limits.
-        coarse: whether a copy may be used.
+    The `tolerance` on a coarse copy is at least 3e-3; `relay` is the queue whose delivered rate is
+    maximised, if any; `constraints` says what flights of given kinematics keep beside their limits.
     """
     copy, reward, on_copy = kin, stage, list(flights.values())
     if coarse and len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:

@@ -17,8 +17,8 @@ BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
 """What `global` stands for: paths found over the map gained nothing beside these (44 random plans,
 fences and samples)."""
 
-_BISECTIONS = 12
-"""Bisections of the share of the way to the stations: it is found to 1 / 4096. Chosen."""
+_BISECTIONS = 8
+"""Bisections of the share of the way to the stations: it is found to 1 / 256. Chosen."""
 
 _LEAST_SHARE = 0.02
 """Share of the way to a station below which a start would be all but the straight one. Chosen."""
