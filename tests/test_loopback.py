@@ -30,6 +30,7 @@ SHORTER: dict[str, Any] = {
     "radio.base_station.power_dbm": 0,
     "radio.relay.power_dbm": 0,
     "radio.fading_samples": 8,
+    "mission.path_tolerance": 3,
 }
 """Of `missions/copter_relay.yaml`: half a minute of flight, timed in seconds for PX4 too."""
 
