@@ -20,8 +20,10 @@ _LISTEN = 2.0
 
 _AGAIN, _TRIES = 1.5, 5
 """Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
-guide has it for missions. A vehicle may refuse for a while: PX4 its mode for setpoints, until they
-have come for a second."""
+guide has it for missions."""
+
+_WORDS = 1.0
+"""Seconds for which what the vehicle says of an arming that it denies is waited for; chosen."""
 
 
 @dataclass(slots=True)
@@ -145,10 +147,16 @@ class Start(Watch):
         order.refusals += 1
         if self.phase == "disarming" and order.refusals == _TRIES:
             self._leave_armed(f"it {order.answer}")
+        if self.phase == "arming":
+            self._not_armed(order, now)
         return self._refused(order, now) if self.phase == "starting" else ()
 
     def _accepted(self, now: float) -> Sequence[Message]:
         return self._start(now) if self.phase == "arming" else ()
+
+    def _not_armed(self, order: Order, now: float) -> None:
+        """Ask no more, now that arming is denied, and end when it has said why."""
+        order.sent, order.due = _TRIES, now + _WORDS
 
     def _begin(self) -> None:
         self._order = None

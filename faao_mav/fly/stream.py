@@ -12,7 +12,7 @@ from faao_mav.fly.gate import LEVEL, Gate
 from faao_mav.fly.itinerary import Itinerary
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.start import Start
+from faao_mav.fly.start import Order, Start
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.wire.messages import (
@@ -39,6 +39,10 @@ _EARLY, _OLD = 0.8, 1.0
 """The share of a period after which the next setpoint may go, for they come irregularly; and from
 how many seconds of the world on a position is too old to be answered by one: a link may have held
 it back. Chosen."""
+
+_STREAMED = 1.5
+"""By how many times as long as the vehicle wants setpoints come before it is asked to follow them.
+Chosen."""
 
 _FAILSAFE = "it is in its failsafe, until setpoints come again"
 
@@ -87,7 +91,7 @@ class Stream(Start):
         self._unsure_since: float | None = None
         """Since when it is not known who flies it: then nothing that moves it is sent."""
         self._heard_at = self._sent_by = math.inf
-        self._last_sent = -math.inf
+        self._first_sent, self._last_sent = math.inf, -math.inf
         if self._rules.loss:
             self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
 
@@ -138,6 +142,8 @@ class Stream(Start):
             self.seen.told.append(lean)
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase, self._asked = "engaging", {self._mode}
+        if self._rules.takes_off_by_setpoints:
+            return ()  # setpoints come first
         return self._set_mode(now, self._guided)
 
     def _start(self, now: float) -> Sequence[Message]:
@@ -151,6 +157,16 @@ class Stream(Start):
         if self.phase == "starting":
             self._begin()
         return super()._accepted(now)
+
+    def _not_armed(self, order: Order, now: float) -> None:
+        """Ask again for a while: in this mode it may need what its checks did not ask for before.
+
+        That is a position above all.
+        """
+        if now < self._begun + self._patience:
+            order.sent = 0
+        else:
+            super()._not_armed(order, now)
 
     def _begin(self) -> None:
         self.phase, self._order = "flying", None
@@ -243,8 +259,12 @@ class Stream(Start):
         if self.phase == "flying" and self.flight.part == "over" and self._mode == self._guided:
             self.phase = "ending"
             out += self._set_mode(now, self._finish)
+        streamed = t >= self._first_sent + _STREAMED * self._rules.streamed
+        if self.phase == "engaging" and self._order is None and streamed:
+            out += self._set_mode(now, self._guided)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent, self._sent_by = t, now + self._patience
+            self._first_sent = min(self._first_sent, t)
             out.append(self._frame.message(setpoint, position, self._peer.address))
         return out
 
