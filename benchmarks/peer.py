@@ -97,7 +97,8 @@ def _hurried(kin: Kinematics, stops: Sequence[Real]) -> Trajectory:
 
 def curve(link: Link, rate: TableRate, number: int) -> Curve:
     """The curve of `rate` over the logarithm of the path gain."""
-    grid = rate.gain_log
+    assert rate.still is not None
+    grid = rate.table.spline.x - rate.still[0]
     spline = ca.interpolant(f"rate{number}", "bspline", [grid], rate.value(grid, 0 * grid))
     return Curve(link, spline, np.zeros((1, 1)))
 

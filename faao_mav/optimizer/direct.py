@@ -206,7 +206,7 @@ def _at_exact_rates(
     reached = _worth(problem, flight.w, precoders)
     error = 0.0 if scheme.gaussian else optimum.value - reached
     cutoff = problem.plan.optimizer.rate == "cutoff"
-    if not cutoff or all(_is_exact(rate) for rate in field.rates):
+    if not cutoff or all(not isinstance(rate, TableRate) or rate.exact for rate in field.rates):
         return flight, precoders, error
     fixed = [
         FixedRate(link, unturned(link, link_coordinates(link, flight.w.T).cosine, P))
@@ -223,10 +223,6 @@ def _at_exact_rates(
         relay=problem.maximised_queue,
     ).trajectory
     return flight, _designed(problem, scheme, flight.w, precoders), error
-
-
-def _is_exact(rate: RateModel) -> bool:
-    return not isinstance(rate, TableRate) or rate.kind != "modes" or rate.exact
 
 
 def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:

@@ -99,6 +99,6 @@ def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> N
         H = link.channel(w, link.small_scale(w))
         true = link.draw_rates(H, link.best(H[:, None]))
         assert exact
-        assert (values[:, 0] >= true - 1e-12).all()
+        assert (values[:, 0] >= true - 1e-6).all()
         if kind == "all_ones":
-            assert values[:, 0] == pytest.approx(true, abs=1e-9)
+            assert values[:, 0] == pytest.approx(true, abs=1e-6)

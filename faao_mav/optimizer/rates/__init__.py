@@ -38,22 +38,18 @@ from faao_mav.optimizer.problem import Link
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DirectionPartials:
-    """The derivatives R_u, R_lu and R_uu of a rate that depends on u, bits (..., n)."""
-
-    by_u: Real
-    by_lu: Real
-    by_uu: Real
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class RatePartials:
-    """The rate R of every slot with R_l and R_ll, bits (..., n); `direction` if R depends on u."""
+    """The rate R of every slot with R_l and R_ll, bits (..., n).
+
+    `by_u`, `by_lu` and `by_uu` are R_u, R_lu and R_uu of a rate that depends on u, else None.
+    """
 
     value: Real
     by_l: Real
     by_ll: Real
-    direction: DirectionPartials | None = None
+    by_u: Real | None = None
+    by_lu: Real | None = None
+    by_uu: Real | None = None
 
 
 class RateModel(Protocol):
@@ -71,14 +67,13 @@ class RateModel(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkCoordinates:
-    """The positions w as one station sees them, (..., n) each.
+    """The positions w as one station sees them.
 
-    `east` and `north` are w - p in metres, `squared_distance` is d² in m², `gain_log` is l and
-    `cosine` is u.
+    `away` (2, ..., n) are w - p in metres, `squared_distance` (..., n) is d² in m², `gain_log`
+    (..., n) is l and `cosine` (..., n) is u.
     """
 
-    east: Real
-    north: Real
+    away: Real
     squared_distance: Real
     gain_log: Real
     cosine: Real
@@ -89,35 +84,41 @@ class LinkCoordinates:
         Returns:
             R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per m².
         """
-        x, y = self.east, self.north
-        # l_i = g x_i and l_ij = g δ_ij + l_i l_j with g = -2 / d²
-        g = -2 / self.squared_distance
-        l_x, l_y = g * x, g * y
-        both, level = rate.by_l + rate.by_ll, g * rate.by_l
-        gradient = np.stack([rate.by_l * l_x, rate.by_l * l_y])
-        across = both * l_x
-        hessian = np.stack([across * l_x + level, across * l_y, both * l_y * l_y + level])
-        if rate.direction is None:
-            return gradient, hessian
-        at = rate.direction
-        # u = x / d, with derivatives by way of r = 1 / d, r_i = -x_i r³
-        r = 1 / np.sqrt(self.squared_distance)
-        r3 = r / self.squared_distance
-        r5 = 3 * r3 / self.squared_distance
-        u_x, u_y = r - x * x * r3, -x * y * r3
-        gradient += np.stack([at.by_u * u_x, at.by_u * u_y])
-        u_ij = np.stack([x * (x * x * r5 - 3 * r3), y * (x * x * r5 - r3), x * (y * y * r5 - r3)])
-        hessian += at.by_u * u_ij + at.by_uu * np.stack([u_x * u_x, u_x * u_y, u_y * u_y])
-        crossed = np.stack([2 * l_x * u_x, l_x * u_y + l_y * u_x, 2 * l_y * u_y])
-        hessian += at.by_lu * crossed
+        l_i, l_ij = self._gain_slopes()
+        gradient = rate.by_l * l_i
+        hessian = rate.by_l * l_ij + rate.by_ll * _pairs(l_i, l_i)
+        if rate.by_u is not None and rate.by_lu is not None and rate.by_uu is not None:
+            u_i, u_ij = self._cosine_slopes()
+            gradient += rate.by_u * u_i
+            hessian += rate.by_u * u_ij + rate.by_uu * _pairs(u_i, u_i)
+            hessian += 2 * rate.by_lu * _pairs(l_i, u_i)
         return gradient, hessian
+
+    def _gain_slopes(self) -> tuple[Real, Real]:
+        """Return gradient (2, ..., n) and Hessian (3, ..., n) of l by w."""
+        l_i = -2 * self.away / self.squared_distance
+        l_ij = _pairs(l_i, l_i)
+        l_ij[[0, 2]] -= 2 / self.squared_distance
+        return l_i, l_ij
+
+    def _cosine_slopes(self) -> tuple[Real, Real]:
+        """Return gradient (2, ..., n) and Hessian (3, ..., n) of u = x / d by w."""
+        x, y = self.away
+        r = 1 / np.sqrt(self.squared_distance)
+        r3, r5 = r**3, 3 * r**5
+        u_i = np.stack([r - x * x * r3, -x * y * r3])
+        u_ij = np.stack([x * (x * x * r5 - 3 * r3), y * (x * x * r5 - r3), x * (y * y * r5 - r3)])
+        return u_i, u_ij
+
+
+def _pairs(a: Real, b: Real) -> Real:
+    """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ..., n)."""
+    return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])
 
 
 def link_coordinates(link: Link, w: Real) -> LinkCoordinates:
     """Return the coordinates of the positions w (2, ..., n), m, for the station of `link`."""
-    east, north = w[0] - link.station[0], w[1] - link.station[1]
-    squared_distance = east * east + north * north + link.altitude**2
-    gain_log = np.log(link.reference_gain / squared_distance)
-    return LinkCoordinates(
-        east, north, squared_distance, gain_log, east / np.sqrt(squared_distance)
-    )
+    away = np.stack([w[0] - link.station[0], w[1] - link.station[1]])
+    squared_distance = np.sum(away**2, axis=0) + link.altitude**2
+    gain_log = np.log(link.gain(np.moveaxis(w, 0, -1)))
+    return LinkCoordinates(away, squared_distance, gain_log, away[0] / np.sqrt(squared_distance))

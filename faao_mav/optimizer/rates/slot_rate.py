@@ -8,7 +8,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
-from faao_mav.optimizer.rates import DirectionPartials, RatePartials
+from faao_mav.optimizer.rates import RatePartials
 from faao_mav.radio.class_sum import class_sum
 from faao_mav.radio.quadratic_form import coordinates
 
@@ -100,8 +100,8 @@ class FixedRate:
         if not follows:
             return RatePartials(value, by_l, by_ll)
         right, left = (self._slopes(gain_log, cosine + d)[1] for d in (h, -h))
-        direction = DirectionPartials(by_u, (u_up - u_down) / (2 * h), (right - left) / (2 * h))
-        return RatePartials(value, by_l, by_ll, direction)
+        by_lu, by_uu = (u_up - u_down) / (2 * h), (right - left) / (2 * h)
+        return RatePartials(value, by_l, by_ll, by_u, by_lu, by_uu)
 
     def _slopes(self, gain_log: Real, cosine: Real) -> tuple[Real, Real]:
         """Return the derivatives of the cutoff rate by l and u, bits (n,).
@@ -149,4 +149,4 @@ def by_differences(
     right, left = at(0, 1), at(0, -1)
     by_lu = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * h**2)
     by_u, by_uu = (right - left) / (2 * h), (right - 2 * middle + left) / h**2
-    return RatePartials(middle, by_l, by_ll, DirectionPartials(by_u, by_lu, by_uu))
+    return RatePartials(middle, by_l, by_ll, by_u, by_lu, by_uu)

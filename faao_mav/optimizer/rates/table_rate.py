@@ -22,7 +22,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Flags, Integers, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
-from faao_mav.optimizer.rates import DirectionPartials, RatePartials
+from faao_mav.optimizer.rates import RatePartials
 from faao_mav.optimizer.rates.spline import Spline
 from faao_mav.radio.best_precoder import has_closed_form
 
@@ -86,18 +86,9 @@ class TableRate:
 
     @property
     def exact(self) -> bool:
-        """Whether the only error is that of the spline: the best precoders have a closed form."""
-        cutoff = self.link.measure == "cutoff"
-        return (
-            cutoff
-            and self.kind == "modes"
-            and has_closed_form(self.link.modulation, self.link.transmit)
-        )
-
-    @property
-    def gain_log(self) -> Real:
-        """The l of the grid of a curve, (m,)."""
-        return self.table.spline.x - _shifted(self.link, self.kind, np.zeros(1))[0]
+        """Whether no searched precoders were interpolated between known draws."""
+        closed = has_closed_form(self.link.modulation, self.link.transmit)
+        return self.kind != "modes" or (closed and self.link.measure == "cutoff")
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (..., n)."""
@@ -116,12 +107,14 @@ class TableRate:
             gain_log + here[0], here[1]
         )
         bent = by_xx * x_u**2 + 2 * by_xy * x_u * y_u + by_yy * y_u**2
-        direction = DirectionPartials(
+        return RatePartials(
+            value,
+            by_l=by_x,
+            by_ll=by_xx,
             by_u=by_x * x_u + by_y * y_u,
             by_lu=by_xx * x_u + by_xy * y_u,
             by_uu=bent + by_x * x_uu + by_y * y_uu,
         )
-        return RatePartials(value, by_x, by_xx, direction)
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
         """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,).

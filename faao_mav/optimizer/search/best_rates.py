@@ -7,9 +7,9 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 from faao_mav.radio.best_precoder import has_closed_form
-from faao_mav.radio.rate import cutoff_rate
 
 _SEARCHED = 25
 """Distances at which precoders are searched where there is no table of modes. Chosen."""
@@ -26,35 +26,26 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
     exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
-    gain_log = np.log(link.reference_gain / (r**2 + link.altitude**2))
-    if link.nlos is None or optimal.averaged:
+    gain_log = np.log(link.gain(link.station + np.stack([r, np.zeros_like(r)], axis=-1))).T
+    if link.nlos is not None and not optimal.averaged:
+        singular = _largest_singular_values(link, len(r))
+        H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
+        k = np.arange(singular.shape[1])
+        H_r[:, k, k] = singular
+        link = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
+    if kind_of(link, optimal):
         span = np.array([gain_log.min(), gain_log.max()])
-        (curve,) = table_rates([link], optimal, [span])
-        return curve.value(gain_log, gain_log), not optimal.averaged and exact
-    singular = _largest_singular_values(link, len(r))
-    H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
-    k = np.arange(singular.shape[1])
-    H_r[:, k, k] = singular
-    if exact:
-        # a path gain scales H and leaves the singular vectors, and with them P, as they are
-        best = link.best(H_r[:, None])
-        H = np.exp(gain_log / 2)[..., None, None] * H_r[:, None]
-        return cutoff_rate(H, best[:, None], link.classes, link.noise), True
-    diagonal = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
-    if kind_of(diagonal, optimal):
-        (rate,) = table_rates([diagonal], optimal, [np.array([gain_log.min(), gain_log.max()])])
-        return np.stack([rate.value(column, column) for column in gain_log.T], axis=1), False
+        (table,) = table_rates([link], optimal, [span])
+        return table.value(gain_log, gain_log).T, not optimal.averaged and exact
     # One distance after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
 
-    columns = np.linspace(0, r.shape[1] - 1, _SEARCHED).astype(np.intp)
-    rates, P = [], None
-    for column in columns:
-        H = np.exp(gain_log[:, column] / 2)[:, None, None] * H_r
-        P = link.best(H[:, None], P)
-        rates.append(link.draw_rates(H, P))
-    spline = CubicSpline(columns, np.stack(rates, axis=1), axis=1)
-    return np.asarray(spline(np.arange(r.shape[1]))), False
+    rows, slots = (
+        np.linspace(0, len(gain_log) - 1, _SEARCHED).astype(np.intp),
+        SlotRate(link, optimal),
+    )
+    rates = [slots.value(row, row) for row in gain_log[rows]]
+    return np.asarray(CubicSpline(rows, rates)(np.arange(len(gain_log)))).T, exact
 
 
 def _largest_singular_values(link: Link, slots: int) -> Real:
