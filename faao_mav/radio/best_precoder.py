@@ -15,10 +15,9 @@ information in linear vector Gaussian channels", IEEE Trans. Inf. Theory 52 (200
 import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
-from faao_mav.errors import InputError
 from faao_mav.radio.class_sum import ClassSum, class_sum
 from faao_mav.radio.constellation import difference_classes
-from faao_mav.radio.mutual_information import NODES, information_and_errors
+from faao_mav.radio.mutual_information import NODES, mutual_information
 from faao_mav.radio.precoder import bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.precoder_search import (
     Objective,
@@ -94,8 +93,7 @@ def best_precoders(
             there only, which is far quicker, and its result is not worse than the start.
 
     Raises:
-        InputError: W or σ² is not above 0, H or the start is not finite or has the wrong shape, or
-            the modulation is unknown.
+        InputError: W or σ² is not above 0, or the modulation is unknown.
 
     >>> H = np.array([[2.0, 1.0], [1.0, 1.0]]) * np.sqrt(0.5)
     >>> P = best_precoders(H[None], 2.0, "qpsk", 1.0)
@@ -105,11 +103,7 @@ def best_precoders(
     check_positive("transmit power", power)
     check_positive("noise power", noise)
     H = np.asarray(H, dtype=np.complex128)
-    if H.ndim < 3 or 0 in H.shape[-3:] or not np.all(np.isfinite(H)):
-        raise InputError(f"channels must be finite with at least 3 axes, got {H.shape}")
     shape, (S, receive, N) = H.shape[:-3], H.shape[-3:]
-    if start is not None and (np.shape(start) != (*shape, N, N) or not np.all(np.isfinite(start))):
-        raise InputError(f"the start must be finite and {(*shape, N, N)}, got {np.shape(start)}")
     flat = H.reshape(-1, S, receive, N)
     if N == 1:
         P = np.ones((len(flat), 1, 1), dtype=np.complex128)
@@ -210,7 +204,10 @@ def _information_objective(modes: Complex, modulation: str, nodes: int) -> Objec
     gram = modes.conj().mT @ modes * (-2 / np.log(2.0))
 
     def objective(at: Integers, Q: Complex) -> tuple[Real, Complex]:
-        value, errors = information_and_errors(modes[at], Q[:, None], modulation, 1.0, nodes)
+        errors = np.zeros((*modes[at].shape[:2], *Q.shape[2:] * 2), dtype=np.complex128)
+        value = mutual_information(
+            modes[at], Q[:, None], modulation, 1.0, nodes=nodes, errors=errors
+        )
         return -value.mean(axis=1), np.mean(gram[at] @ Q[:, None] @ errors, axis=1)
 
     return objective

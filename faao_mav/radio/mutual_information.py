@@ -116,6 +116,7 @@ def mutual_information(
     *,
     nodes: int = NODES,
     seed: int = SEED,
+    errors: Complex | None = None,
 ) -> Real:
     """Return (5) or (6) of every draw of a channel, (..., S) bits: their mean is accurate.
 
@@ -126,6 +127,8 @@ def mutual_information(
         noise: σ², W.
         nodes: about how many pairs of a vector sent and a noise all draws have together.
         seed: another gives other noises; the spread over seeds is the standard error.
+        errors: zeros (..., S, N_t, N_t), to which E[(x - x^)(x - x^)^H] is added, x^ the mean of x
+            given what is received.
 
     Raises:
         InputError: unknown modulation or a noise not above 0.
@@ -139,21 +142,7 @@ def mutual_information(
     A = np.asarray(H, dtype=np.complex128) @ P
     flat = A.reshape(-1, *A.shape[-3:])
     used = noise_set(modulation, A.shape[-1], A.shape[-3], nodes, seed)
-    return _averages(flat, used, noise, errors=None).reshape(A.shape[:-2])
-
-
-def information_and_errors(
-    H: Complex, P: Complex, modulation: str, noise: float, nodes: int = NODES
-) -> tuple[Real, Complex]:
-    """Return the information and the errors at H (b, S, N_r, N_t) and P (b, S or 1, N_t, N_t).
-
-    The information (b, S), bits, is that of ``mutual_information``; the errors (b, S, N_t, N_t) are
-    E[(x - x^)(x - x^)^H] with x^ the mean of x given what is received.
-    """
-    A = H @ P
-    errors = np.zeros((*A.shape[:2], A.shape[-1], A.shape[-1]), dtype=np.complex128)
-    used = noise_set(modulation, A.shape[-1], A.shape[1], nodes)
-    return _averages(A, used, noise, errors), errors
+    return _averages(flat, used, noise, errors).reshape(A.shape[:-2])
 
 
 def _averages(A: Complex, used: NoiseSet, noise: float, errors: Complex | None) -> Real:

