@@ -40,11 +40,9 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     # One distance after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
 
-    rows, slots = (
-        np.linspace(0, len(gain_log) - 1, _SEARCHED).astype(np.intp),
-        SlotRate(link, optimal),
-    )
-    rates = [slots.value(row, row) for row in gain_log[rows]]
+    rows = np.linspace(0, len(gain_log) - 1, _SEARCHED).astype(np.intp)
+    each = SlotRate(link, optimal)
+    rates = [each.value(row, row) for row in gain_log[rows]]
     return np.asarray(CubicSpline(rows, rates)(np.arange(len(gain_log)))).T, exact
 
 
