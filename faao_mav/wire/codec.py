@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from faao_mav.wire import messages
-from faao_mav.wire.framing import Framer, is_signed, payload_of, sender_of, version_of
+from faao_mav.wire.framing import Framer, is_signed, payload_of, sender_of
 from faao_mav.wire.messages import (
     Envelope,
     Message,
@@ -49,8 +49,8 @@ class Codec:
 
     With `signing` packets are signed, and those passed over that are not, or that are old. `heard`
     has what the messages known here were, whether or not they were passed over: without `signing`,
-    "signed" and "unsigned" are about whether there is a signature. `versions` has the latest
-    MAVLink that each sender has spoken, 1 or 2.
+    "signed" and "unsigned" are about whether there is a signature. `modern` are
+    those that have spoken MAVLink 2.
     """
 
     def __init__(self, address: Address, signing: Signing | None = None) -> None:
@@ -58,7 +58,7 @@ class Codec:
 
         self.address, self._signing = address, signing
         self.heard: set[Verdict] = set()
-        self.versions: dict[Address, int] = {}
+        self.modern: set[Address] = set()
         self._dialect: Any = development
         self._reader: Any = development.MAVLink(None)
         self._mav: Any = development.MAVLink(None, address.system, address.component)
@@ -109,14 +109,18 @@ class Codec:
         verdict: Verdict = "signed" if is_signed(raw) else "unsigned"
         if self._signing is not None:
             verdict = self._signing.judge(raw, sender)
-        envelope = self._envelope(message, sender, origin)
-        self.versions[sender] = max(version_of(raw), self.versions.get(sender, 1))
+        payload = payload_of(raw)
+        if payload is not None:
+            self.modern.add(sender)
+        envelope = self._envelope(message, payload or b"", sender, origin)
         if envelope is not None:
             self.heard.add(verdict)
         passed_over = self._signing is not None and verdict != "signed"
         return None if passed_over else Packet(raw, envelope)
 
-    def _envelope(self, packet: Any, sender: Address, origin: str) -> Envelope | None:
+    def _envelope(
+        self, packet: Any, payload: bytes, sender: Address, origin: str
+    ) -> Envelope | None:
         name = packet.get_type()
         kind = _KINDS.get(name) or _LEGACY.get(name)
         if kind is None:
@@ -128,8 +132,8 @@ class Codec:
                 case "target":
                     values["target"] = Address(packet.target_system, packet.target_component)
                 case "opaque_id" | "mission_id" as beyond:
-                    rest = payload_of(bytes(packet.get_msgbuf()))[packet.unpacker.size :]
-                    values[beyond] = int.from_bytes(rest[:4], "little")
+                    rest = payload[packet.unpacker.size :][:4]
+                    values[beyond] = int.from_bytes(rest, "little")
                 case "legacy":
                     values["legacy"] = legacy
                 case "item":

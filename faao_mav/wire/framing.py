@@ -64,14 +64,9 @@ def is_signed(packet: bytes) -> bool:
     return packet[0] == _MAVLINK_2 and bool(packet[2] & _SIGNED)
 
 
-def version_of(packet: bytes) -> int:
-    """Return the version of MAVLink that `packet` is written in, 1 or 2."""
-    return 1 if packet[0] == _MAVLINK_1 else 2
-
-
-def payload_of(packet: bytes) -> bytes:
-    """Return what the MAVLink 2 `packet` carries; nothing for a MAVLink 1 packet."""
-    return packet[10 : 10 + packet[1]] if packet[0] == _MAVLINK_2 else b""
+def payload_of(packet: bytes) -> bytes | None:
+    """Return what the MAVLink 2 `packet` carries; None for a MAVLink 1 packet."""
+    return packet[10 : 10 + packet[1]] if packet[0] == _MAVLINK_2 else None
 
 
 def sender_of(packet: bytes) -> Address:

@@ -140,7 +140,7 @@ class WireLink:
 
     def speaks_old(self, sender: Address) -> bool:
         """Tell whether all that was heard of `sender` is MAVLink 1."""
-        return self._codec.versions.get(sender) == 1
+        return sender not in self._codec.modern
 
     def bind(self, vehicle: Address, origin: Origin) -> None:
         """Talk to `vehicle` at `origin` alone from now on.
