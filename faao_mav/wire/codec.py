@@ -49,8 +49,8 @@ class Codec:
 
     With `signing` packets are signed, and those passed over that are not, or that are old. `heard`
     has what the messages known here were, whether or not they were passed over: without `signing`,
-    "signed" and "unsigned" are about whether there is a signature. `modern` are
-    those that have spoken MAVLink 2.
+    "signed" and "unsigned" are about whether there is a signature. `modern` has who has spoken
+    MAVLink 2.
     """
 
     def __init__(self, address: Address, signing: Signing | None = None) -> None:
@@ -109,18 +109,15 @@ class Codec:
         verdict: Verdict = "signed" if is_signed(raw) else "unsigned"
         if self._signing is not None:
             verdict = self._signing.judge(raw, sender)
-        payload = payload_of(raw)
-        if payload is not None:
+        if payload_of(raw) is not None:
             self.modern.add(sender)
-        envelope = self._envelope(message, payload or b"", sender, origin)
+        envelope = self._envelope(message, raw, origin)
         if envelope is not None:
             self.heard.add(verdict)
         passed_over = self._signing is not None and verdict != "signed"
         return None if passed_over else Packet(raw, envelope)
 
-    def _envelope(
-        self, packet: Any, payload: bytes, sender: Address, origin: str
-    ) -> Envelope | None:
+    def _envelope(self, packet: Any, raw: bytes, origin: str) -> Envelope | None:
         name = packet.get_type()
         kind = _KINDS.get(name) or _LEGACY.get(name)
         if kind is None:
@@ -132,8 +129,8 @@ class Codec:
                 case "target":
                     values["target"] = Address(packet.target_system, packet.target_component)
                 case "opaque_id" | "mission_id" as beyond:
-                    rest = payload[packet.unpacker.size :][:4]
-                    values[beyond] = int.from_bytes(rest, "little")
+                    rest = (payload_of(raw) or b"")[packet.unpacker.size :]
+                    values[beyond] = int.from_bytes(rest[:4], "little")
                 case "legacy":
                     values["legacy"] = legacy
                 case "item":
@@ -142,7 +139,7 @@ class Codec:
                         return None
                 case plain:
                     values[plain] = _text_or_number(getattr(packet, plain))
-        return Envelope(sender, kind(**values), origin)
+        return Envelope(sender_of(raw), kind(**values), origin)
 
 
 def _item_values(item: WireItem, *, exact: bool) -> dict[str, Any]:
