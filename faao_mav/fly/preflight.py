@@ -1,4 +1,4 @@
-"""The gate before a flight: what is to be flown against what was seen of the vehicle.
+"""The gate before a flight: what is to be flown against what is held and seen of the vehicle.
 
 Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints.
 """
@@ -10,7 +10,8 @@ from functools import partial
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import addressee_mistake
 from faao_mav.autopilot.manners import FenceAction
-from faao_mav.fly.seen import Flight, Seen
+from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.telemetry import Telemetry
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.rule import Finding, Level
@@ -43,9 +44,9 @@ _AT_FENCE: dict[FenceAction, str] = {
 
 
 def preflight(
-    flight: Flight, seen: Seen, *, elsewhere: bool = False, untimed: bool = False
+    flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool = False, untimed: bool = False
 ) -> tuple[Finding, ...]:
-    """Return what stands against `flight` by the vehicle that was `seen`, and what to know of it.
+    """Return what stands against `flight` by a vehicle that `held` this and was `seen` so.
 
     An error means that it is not armed. `elsewhere` allows another place than the mission was made
     for, `untimed` other parameters than it is timed for; what they overrule is told as a warning.
@@ -54,15 +55,15 @@ def preflight(
     if mistake is not None:
         action = "connect to its vehicle, or make another mission"
         return (_error("vehicle-other", mistake, action),)
-    judged = _judged(flight, seen, elsewhere=elsewhere)
+    judged = _judged(flight, held, seen, elsewhere=elsewhere)
     found = [
         *_state(flight, seen),
-        *_place(flight, seen),
-        *_lists(flight, seen, judged.vehicle),
-        *_timing(flight, seen, judged),
+        *_place(flight, held, seen),
+        *_lists(flight, held, seen, judged.vehicle),
+        *_timing(flight, held, seen, judged),
         *_battery(seen, judged),
         *(each for each in judged.findings if each.level is not Level.NOTE),
-        *_failsafes(flight, seen, judged.vehicle),
+        *_failsafes(flight, held, seen, judged.vehicle),
     ]
     if elsewhere:
         found = [_overruled(each, "place-", "--elsewhere") for each in found]
@@ -85,16 +86,16 @@ def _overruled(found: Finding, rules: str, option: str) -> Finding:
     return replace(found, level=Level.WARNING, action=f"{option}: flown all the same")
 
 
-def _judged(flight: Flight, seen: Seen, *, elsewhere: bool) -> Check:
+def _judged(flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool) -> Check:
     """Return what validation says of the mission, from where it stands, with what it holds."""
-    mission, solution = seen.held.beside(flight.placed, seen.vehicle), flight.solution
+    mission, solution = held.beside(flight.placed, seen.vehicle), flight.solution
     if seen.place is not None and (elsewhere or Whereabouts.of(seen.place, mission).is_meant):
         mission = replace(mission, home=seen.place)
     vehicle = replace(
         flight.vehicle,
         autopilot=seen.vehicle.family.key,
         kind=seen.vehicle.kind,
-        parameters=seen.held.reading.values,
+        parameters=held.reading.values,
         source="the vehicle",
     ).usable()
     limits = None if solution is None else Limits(max_speed=solution.plan.vehicle.max_speed)
@@ -109,32 +110,33 @@ def _of_the_mission(found: Finding) -> bool:
     return late or found.rule == "speed-above-limit"
 
 
-def _state(flight: Flight, seen: Seen) -> Iterator[Finding]:
+def _state(flight: Flight, seen: Telemetry) -> Iterator[Finding]:
     if seen.armed:
         yield _error("armed", "it is armed already", "disarm it, or watch it without --arm")
     if seen.stations:
         yield _error(
             "ground-station",
-            f"another ground station is on the link ({'; '.join(seen.stations)})",
+            f"another ground station is on the link ({'; '.join(sorted(seen.stations))})",
             "close it, or let it start the mission",
         )
     if seen.strangers:
-        message = f"its number is used by another vehicle too, at {', '.join(seen.strangers)}"
+        where = ", ".join(sorted(seen.strangers))
+        message = f"its number is used by another vehicle too, at {where}"
         yield _error("number-twice", message, "give each a number of its own")
     if flight.streamed:
         return
     if seen.row is not None and seen.row > 1:
         message = f"it would go on at item {seen.row}, not at the beginning"
         yield _error("item-not-first", message, "set the first item (or reboot)")
-    if seen.mode in seen.vehicle.modes.not_to_arm_in:
+    if seen.custom_mode in seen.vehicle.modes.not_to_arm_in:
         yield _error(
             "mode",
-            f"it is in mode {seen.mode_name}, in which it is not armed, or flies as soon as it is",
+            f"it is in mode {seen.mode}, in which it is not armed, or flies as soon as it is",
             "set the mode in which the pilot is to take over",
         )
 
 
-def _place(flight: Flight, seen: Seen) -> Iterator[Finding]:
+def _place(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
     place, mission = seen.place, flight.placed
     if place is None:
         message = "it does not tell where it stands"
@@ -162,7 +164,7 @@ def _place(flight: Flight, seen: Seen) -> Iterator[Finding]:
         far = stands.from_home is None or not first <= FIRST_FARTHEST
         message = f"the mission's first place is {shown(first)} from where it stands"
         yield (_error if far else _warning)("place-first", message, action)
-    home = seen.held.home
+    home = held.home
     off = 0.0 if home is None else distance(place, (home.latitude, home.longitude))
     if not off <= HOME_AWAY:
         message = f"its own home, where it returns to, is {shown(off)} from where it stands"
@@ -170,15 +172,15 @@ def _place(flight: Flight, seen: Seen) -> Iterator[Finding]:
         yield _warning("returns-elsewhere", message, action)
 
 
-def _lists(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
+def _lists(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterator[Finding]:
     """Yield where what it holds is not what the file has, no more and no less."""
     for part in MissionType:
-        rule, rows = f"holds-{part.name.lower()}", seen.held.rows(part, seen.vehicle)
+        rule, rows = f"holds-{part.name.lower()}", held.rows(part, seen.vehicle)
         wanted = wire_items(flight.mission, part, seen.vehicle)
-        if part in seen.held.missing:
+        if part in held.missing:
             yield _error(rule, f"{part.title}: what it holds cannot be read", "try again")
         elif wanted:
-            for wrong in seen.held.other_than(wanted, part, seen.vehicle)[:1]:
+            for wrong in held.other_than(wanted, part, seen.vehicle)[:1]:
                 yield _error(rule, f"it holds another one: {wrong}", "upload it again")
         elif rows:
             idle = part is MissionType.FENCE and own.type.at_fence(own).action == "nothing"
@@ -191,9 +193,9 @@ def _lists(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
                 yield _error(rule, message, action)
 
 
-def _timing(flight: Flight, seen: Seen, judged: Check) -> Iterator[Finding]:
+def _timing(flight: Flight, held: Held, seen: Telemetry, judged: Check) -> Iterator[Finding]:
     """Yield where its parameters are not those that the mission is timed for."""
-    given, values = flight.vehicle.parameters, seen.held.reading.values
+    given, values = flight.vehicle.parameters, held.reading.values
     other, unread, assumed = list[str](), list[str](), list[str]()
     for parameter in seen.vehicle.parameters.values():
         timed = parameter.motion and parameter.name_in(given) is not None
@@ -229,7 +231,7 @@ def _lateness(flight: Flight, judged: Check) -> str:
     return f"; predicted to take {judged.track.t[-1]:.1f} s, not {meant.t[-1]:.1f} s"
 
 
-def _battery(seen: Seen, judged: Check) -> Iterator[Finding]:
+def _battery(seen: Telemetry, judged: Check) -> Iterator[Finding]:
     energy, percent = judged.energy, seen.battery
     if percent is None:
         action = "see to it that the battery is full"
@@ -245,9 +247,9 @@ def _battery(seen: Seen, judged: Check) -> Iterator[Finding]:
         yield _error("battery-low", message, "change the battery")
 
 
-def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
+def _failsafes(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterator[Finding]:
     """Yield what it does by itself on a loss, one line each."""
-    values = seen.held.reading.values
+    values = held.reading.values
     for failsafe in own.type.failsafes:
         rule = f"on-{failsafe.loss.lower().replace(' ', '-')}"
         told = failsafe.told(values, streamed=flight.streamed)
@@ -266,7 +268,7 @@ def _failsafes(flight: Flight, seen: Seen, own: Vehicle) -> Iterator[Finding]:
             yield _error("on-setpoints-lost", *refusal)
         else:
             yield _note("on-setpoints-lost", f"setpoints lost: {rules.without(values)}")
-    if seen.held.rows(MissionType.FENCE, seen.vehicle):
+    if held.rows(MissionType.FENCE, seen.vehicle):
         response = own.type.at_fence(own)
         name = own.name_of(response.parameter)
         level, action = Level.WARNING, f"set {name} {response.set_to}"

@@ -3,17 +3,16 @@
 from collections.abc import Sequence
 
 from faao_mav.fly.preflight import preflight
-from faao_mav.fly.seen import Flight, Held, Seen, read_held
+from faao_mav.fly.seen import Flight, Held, read_held
 from faao_mav.fly.telemetry import Telemetry
-from faao_mav.mission.item import Home
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.transfer.exchange import Peer
 
-_STEADY, _LOOK = 5, 5.0
-"""Digits of a degree to which a place is looked at, a metre; and seconds after which it is told
-what stands against a flight, though its place is not known. Chosen."""
+_LOOK = 5.0
+"""Seconds after which it is told what stands against a flight, though its place is not known.
+Chosen."""
 
 
 class Readiness:
@@ -34,7 +33,7 @@ class Readiness:
         self._flight, self._held, self._peer = flight, held, peer
         self._allowed = allowed
         self.findings: tuple[Finding, ...] | None = None
-        self._judged: Seen | None = None
+        self._judged: tuple[object, ...] = ()
         self._reading: Script[Held] | None = None
         self.begun = 0.0
 
@@ -52,21 +51,16 @@ class Readiness:
         """Take note of what the vehicle says, and answer it."""
         return () if self._reading is None else self._reading.on(envelope, now)
 
-    def judge(self, seen: Telemetry, now: float) -> None:
-        """Judge what is heard, once enough is, and again when that is something else."""
-        beat, place, vehicle = seen.heartbeat, seen.place, self._peer.vehicle
-        known = place is not None and seen.status is not None
-        if beat is None or vehicle is None or not (known or now >= self.begun + _LOOK):
+    def judge(self, seen: Telemetry, now: float, *, again: bool = False) -> None:
+        """Judge what is heard, once enough is, and `again` or when that is another state."""
+        known = seen.place is not None and seen.status is not None
+        if seen.heartbeat is None or not (known or now >= self.begun + _LOOK):
             return
-        if place is not None:
-            level = round(place.latitude, _STEADY), round(place.longitude, _STEADY)
-            place = Home(*level, round(place.altitude))
-        others = tuple(sorted(seen.stations)), tuple(sorted(seen.strangers))
-        state = beat.armed, beat.custom_mode, seen.mode, seen.row
-        found = Seen(vehicle, self._held, place, seen.battery, *state, *others)
-        if found != self._judged:
-            self._judged = found
-            self.findings = preflight(self._flight, found, **self._allowed)
+        others = len(seen.stations), len(seen.strangers)
+        state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
+        if again or state != self._judged:
+            self._judged = state
+            self.findings = preflight(self._flight, self._held, seen, **self._allowed)
 
     def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
         """Return what is to be sent until the gate is up to date; None: `findings` is.
@@ -81,7 +75,7 @@ class Readiness:
         if not seen.is_fresh(now):
             return ()
         self._held = self._reading.outcome
-        self.judge(seen, now)
+        self.judge(seen, now, again=True)
         return None
 
     def cancel(self, now: float) -> Sequence[Message]:

@@ -1,4 +1,4 @@
-"""What is to be flown, and what a vehicle holds and shows before: what the gate compares."""
+"""What is to be flown, and what a vehicle holds before: what the gate compares."""
 
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -116,24 +116,3 @@ class Flight:
         origin = self.solution.plan.origin
         home = Home(origin.latitude, origin.longitude, origin.elevation)
         return replace(self.mission, home=home)
-
-
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """What was seen of a vehicle before its flight.
-
-    `place` is where it stands, metres above mean sea level; `battery` is in percent; `row` is that
-    of the mission file that is under way. None: not known. `stations` are other ground stations on
-    the link, `strangers` addresses of others that use its number.
-    """
-
-    vehicle: VehicleType
-    held: Held
-    place: Home | None = None
-    battery: int | None = None
-    armed: bool = False
-    mode: int = -1
-    mode_name: str = "unknown"
-    row: int | None = None
-    stations: tuple[str, ...] = ()
-    strangers: tuple[str, ...] = ()

@@ -215,12 +215,7 @@ class Start(Watch):
     def _set_out(self, now: float) -> Sequence[Message]:
         """Arm, now that nothing is against it."""
         self.seen.told.append(f"its own checks pass: arming, and starting {self.seen.items} items")
-        return self._arm(self._mode, now)
-
-    @property
-    def _mode(self) -> int:
-        """The mode that it is in."""
-        return -1 if self.seen.heartbeat is None else self.seen.heartbeat.custom_mode
+        return self._arm(self.seen.custom_mode, now)
 
     def _arm(self, mode: int, now: float) -> Sequence[Message]:
         self.phase, self._before, self._asked = "arming", mode, {mode}
@@ -283,7 +278,7 @@ class Start(Watch):
     def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
         """Have it disarm, and end with `then`."""
         self.phase, self._then = "disarming", then
-        self._asked = {self._mode, self._modes.mission, self._modes.guided}
+        self._asked = {self.seen.custom_mode, self._modes.mission, self._modes.guided}
         self.seen.told.append(f"{then.text}: it is asked to disarm")
         return self._say(now, MavCommand.ARM, 0.0)
 

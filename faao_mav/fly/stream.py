@@ -141,7 +141,7 @@ class Stream(Start):
         if lean is not None:
             self.seen.told.append(lean)
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
-        self.phase, self._asked = "engaging", {self._mode}
+        self.phase, self._asked = "engaging", {self.seen.custom_mode}
         if self._rules.takes_off_by_setpoints:
             return ()  # setpoints come first
         return self._set_mode(now, self._guided)
@@ -228,7 +228,7 @@ class Stream(Start):
     def _give_up(self, why: str, now: float) -> Sequence[Message]:
         """End the setpoints of an aircraft that cannot be led on: it is to hold."""
         self.seen.told.append(f"setpoints end: {why}")
-        if self._mode == self._guided:
+        if self.seen.custom_mode == self._guided:
             return self._ask_to_hold(now)
         self._step_aside()
         return ()
@@ -256,7 +256,8 @@ class Stream(Start):
             what = f"home is {risen:+.0f} m higher now"
             self.seen.told.append(f"{what}: setpoints keep to that of the departure")
         out = list[Message]()
-        if self.phase == "flying" and self.flight.part == "over" and self._mode == self._guided:
+        over = self.flight.part == "over" and self.seen.custom_mode == self._guided
+        if self.phase == "flying" and over:
             self.phase = "ending"
             out += self._set_mode(now, self._finish)
         streamed = t >= self._first_sent + _STREAMED * self._rules.streamed
@@ -277,7 +278,7 @@ class Stream(Start):
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
         asked = self.phase == "ending" and self._order is not None
-        if self.phase == "flying" or (asked and self._mode == self._guided):
+        if self.phase == "flying" or (asked and self.seen.custom_mode == self._guided):
             if self._unsure_since is not None:
                 return None
             lead = self._held + self._clock.lead

@@ -97,8 +97,10 @@ class Telemetry:
     def __init__(
         self, peer: Peer, rows: Sequence[WireItem], patience: float, rate: float = POSITION_RATE
     ) -> None:
+        assert peer.vehicle is not None
+        self.vehicle = peer.vehicle
         self._peer, self._rows, self.patience = peer, tuple(rows), patience
-        self._home = home_items(peer.vehicle, MissionType.MISSION)
+        self._home = home_items(self.vehicle, MissionType.MISSION)
         self.told: list[str] = []
         self.said: list[str] = []
         self.fixes: list[Fix] = []
@@ -137,6 +139,16 @@ class Telemetry:
     def row(self) -> int | None:
         """The row of the mission file that is under way: row 0 is home, also for PX4."""
         return None if self.current is None else self.current.seq + 1 - self._home
+
+    @property
+    def armed(self) -> bool:
+        """Whether its motors may turn, by its last heartbeat."""
+        return self.heartbeat is not None and self.heartbeat.armed
+
+    @property
+    def custom_mode(self) -> int:
+        """The vehicle's mode by its number; -1 before the first heartbeat."""
+        return -1 if self.heartbeat is None else self.heartbeat.custom_mode
 
     @property
     def mode(self) -> str:
@@ -252,7 +264,7 @@ class Telemetry:
 
     def _hold(self, rows: Sequence[WireItem]) -> None:
         """Compare the mission that it holds now with the one that it held before."""
-        found = compare(self._rows, rows, MissionType.MISSION, self._peer.vehicle)
+        found = compare(self._rows, rows, MissionType.MISSION, self.vehicle)
         for wrong in (each for each in found if each.kind == "wrong"):
             self._end("changed", f"the vehicle's mission is another one now: {wrong}")
 

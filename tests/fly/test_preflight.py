@@ -8,21 +8,22 @@ from typing import Any
 import pytest
 from conftest import FLYABLE, edited
 from scenes import Scene, held_by
-from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, vehicle_of
+from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, vehicle_of
 
 from faao_mav import parse_plan, plan_mission
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor
 from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.preflight import LEAST_BATTERY, preflight
-from faao_mav.fly.seen import Flight, Held, Seen
+from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.telemetry import Telemetry
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot
 from faao_mav.sim.faults import Faults
 from faao_mav.validate import Finding, Level
-from faao_mav.wire.messages import Envelope, ParamSet
+from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
 from faao_mav.wire.transfer.exchange import Outcome
 from faao_mav.wire.wire_items import wire_items
@@ -51,21 +52,26 @@ def holding(
     return mock
 
 
-def seen_of(mock: MockAutopilot, **changes: Any) -> Seen:
-    """Return what is seen of `mock`, which stands at home with a full battery."""
-    own = mock.vehicle
-    seen = Seen(own, held_by(mock), HOME, 100, False, mock.mode, "resting")
-    return replace(seen, **changes)
-
-
 def found(
     flight: Flight | None = None, mock: MockAutopilot | None = None, **changes: Any
 ) -> dict[str, Finding]:
-    """Return by rule what is found of a mission held by a vehicle at home, but for `changes`."""
+    """Return by rule what is found of a mission held by a vehicle that stands at home.
+
+    It has a full battery and rests, but for `changes`.
+    """
     mission = a_mission(12)
+    mock = mock or holding(mission)
     allowed = {name: changes.pop(name, False) for name in ("elsewhere", "untimed")}
-    seen = seen_of(mock or holding(mission), **changes)
-    return {each.rule: each for each in preflight(flight or Flight(mission), seen, **allowed)}
+    held, told = changes.pop("held", held_by(mock)), {"battery": 100, "armed": False} | changes
+    seen = Telemetry(peer_of(mock.behaviour.family.key), (), 60.0)
+    seen.place = told.get("place", HOME)
+    seen.stations = {*told.get("stations", ())}
+    if told["battery"] is not None:
+        seen.status = SysStatus(0, 0, told["battery"])
+    autopilot, armed = mock.vehicle.family.mav_autopilot, 128 * told["armed"]
+    seen.heartbeat = Heartbeat(2, autopilot, armed | 1, told.get("mode", mock.mode), 4)
+    found = preflight(flight or Flight(mission), held, seen, **allowed)
+    return {each.rule: each for each in found}
 
 
 def errors(findings: Mapping[str, Finding]) -> set[str]:
