@@ -8,6 +8,7 @@ pieces as need be).
 import math
 from itertools import pairwise
 
+import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
@@ -25,33 +26,20 @@ def convex_pieces(shape: BaseGeometry) -> list[Real]:
     >>> [len(piece) for piece in convex_pieces(corner)]
     [4, 4]
     """
-    pieces: dict[int, BaseGeometry] = {}
+    pieces = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
     sides: dict[tuple[tuple[float, ...], ...], list[int]] = {}
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
-    for number, triangle in enumerate(triangles):
-        pieces[number] = triangle
-        corners = [tuple(corner) for corner in shapely.get_coordinates(triangle)]
-        for a, b in pairwise(corners):
-            sides.setdefault((min(a, b), max(a, b)), []).append(number)
-    part_of = {number: number for number in pieces}
-
-    def root(number: int) -> int:
-        while part_of[number] != number:
-            number = part_of[number]
-        return number
-
+    for number, triangle in enumerate(pieces):
+        for side in pairwise(map(tuple, shapely.get_coordinates(triangle).tolist())):
+            sides.setdefault(tuple(sorted(side)), []).append(number)
     common = [(side, both) for side, both in sides.items() if len(both) == 2]
-    common.sort(key=lambda each: -float(math.dist(*each[0])))
+    common.sort(key=lambda each: -math.dist(*each[0]))
+    owners = np.arange(len(pieces))  # the piece that each triangle is of
     for _, both in common:
-        first, second = map(root, both)
-        if first == second:
-            continue
-        joined = shapely.union(pieces[first], pieces[second])
-        hull = joined.convex_hull
-        if hull.area - joined.area <= _FLAT * hull.area:
+        first, second = owners[both]
+        hull = shapely.MultiPolygon([pieces[first], pieces[second]]).convex_hull
+        lacks = hull.area - pieces[first].area - pieces[second].area
+        if first != second and lacks <= _FLAT * hull.area:
             pieces[first] = hull
-            part_of[second] = first
-            del pieces[second]
-    return [
-        shapely.get_coordinates(shapely.orient_polygons(piece))[:-1] for piece in pieces.values()
-    ]
+            owners[owners == second] = first
+    whole = shapely.orient_polygons(pieces[np.unique(owners)])
+    return [shapely.get_coordinates(piece)[:-1] for piece in whole]
