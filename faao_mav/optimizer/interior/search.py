@@ -52,8 +52,9 @@ _STRICT = 1e-4
 """The tolerance that limits are kept to where a search asks for less: so much is what their
 `inside` leaves room for."""
 
-_MOST_MISSED = 0.3
-"""What a step may miss of a limit in second order, where its slack is less. Chosen."""
+_MOST_MISSED = 0.2
+"""What a step may miss of a limit in second order, where its slack is less. Without it two of 31
+flights do not converge, in 30 % more iterations; with 0.3 one of three hard planes is 1 % worse."""
 
 _LEFT = 0.1
 """The share of a linear slack that a half-plane which turns leaves at least, by a wider margin:
