@@ -25,7 +25,6 @@ from faao_mav.optimizer.interior.rewards import Goal
 _SHARES = (0.9, 0.75, 0.5, 0.25)
 """Shares of the curvature of the wrong sign that are tried before it is cut. Chosen."""
 
-
 _BARRIER_SHARE = 0.1
 """c / n: the weight of the barrier that keeps t below the F_j, in those of a slot's limits.
 

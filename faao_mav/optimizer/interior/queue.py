@@ -24,11 +24,11 @@ class Queue(Goal):
     earlier slot. In slot 0 nothing can be forwarded, and what the last receives is worth nothing.
     """
 
-    headroom = 20.0
+    headroom = 20.0  # twice the mu of a cold start: what is received begins at half its worth
 
     def __init__(self, rewards: Rewards, relay: RelayQueue, time_step: float) -> None:
         self.rewards, self.relay = rewards, relay
-        self.flat, self.noise = rewards.flat, rewards.noise
+        self.noise = rewards.noise
         self.buffer = relay.buffer / time_step / rewards.unit
         self.own = 4 if relay.half else 3
         self.held = (3,) if relay.half else ()
@@ -41,12 +41,10 @@ class Queue(Goal):
         rates = self.rewards.base
         I_U, I_G = rates / self.rewards.unit
         n = len(I_U)
-        x = np.full(n, 0.5)
-        if not cold:
+        x = np.full(n, 0.5) if self.relay.half else np.ones(n)
+        if self.relay.half and not cold:
             room = self.buffer * self.rewards.unit
             x = np.clip(best_shares(rates[0], rates[1], room), _LEAST_SHARE, 1 - _LEAST_SHARE)
-        if not self.relay.half:
-            x = np.ones(n)
         found = forward_greedily(x * I_U, (1 - x if self.relay.half else x) * I_G, self.buffer)
         own = np.stack([found.queue, found.received, found.forwarded, x])[: self.own]
         return np.asarray(own * self.free(n))

@@ -8,7 +8,7 @@ The problem is not concave: the interior-point method finds the local optimum ne
   branch of `starts.starts`.
 - `multistart`: improves all of them roughly and chooses those to improve to the end.
 - `bound`: an upper bound on what is maximised, over all flights and precoders: by `map_bound`
-  (prices on both hops and a sweep) or `axis_bound` (place and speed along the line of the
+  (a price on both hops and a sweep) or `axis_bound` (place and speed along the line of the
   stations), over the `best_rates` of the links. Its distance to a solution's rate is what a better
   local optimum could gain at most.
 """
