@@ -185,25 +185,6 @@ def test_rules_are_listed(run: Run) -> None:
     assert {"level", "summary", "source", "autopilot", "type"} <= listed[0].keys()
 
 
-@pytest.mark.parametrize("option", ["--max-duration", "--max-distance", "--max-altitude"])
-def test_a_limit_that_is_none_is_named_as_it_was_given(run: Run, sound: Path, option: str) -> None:
-    for value in ("nan", "inf", "0", "-5"):
-        result = run(sound, option, value)
-        assert result.exit_code == 2
-        assert result.stderr == f"faao-mission: {option} {value}: expected a number above 0\n"
-
-
-def test_a_useless_parameter_is_refused(run: Run, sound: Path) -> None:
-    given = sound.with_name("given.param")
-    beside = sound.with_suffix(".param")
-    for path, options in ((given, ("--parameters", given)), (beside, ())):
-        path.write_text("WPNAV_SPEED,-5\n")
-        result = run(sound, *options)
-        assert result.exit_code == 2
-        assert f"{path}" in result.stderr
-        assert "WPNAV_SPEED: -5; give a number of at least" in result.stderr
-
-
 def test_a_page_of_a_mission_by_itself_and_beside_its_plan(run: Run, sound: Path) -> None:
     page = sound.with_suffix(".html")
     assert run(sound, "--report", page, predicted=True).exit_code == 0
