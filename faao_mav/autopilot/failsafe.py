@@ -1,6 +1,6 @@
 """What a vehicle does by itself when a link, its battery or its position is lost."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -17,53 +17,91 @@ class Response:
 
 
 @dataclass(frozen=True, slots=True)
+class Action:
+    """What a vehicle does by the value of the parameter `decides`.
+
+    Attributes:
+        does: what it does by that value, from 1 on; "" for what is not known. Names in braces stand
+            for the values of parameters.
+        idle: the values with which it does nothing, or goes on with its mission.
+        after: the parameter that says after how many seconds it acts.
+        below: parameters below which it acts, 0 for none, with their units.
+        when: when that is, as the beginning of what it does.
+    """
+
+    decides: str
+    does: Sequence[str]
+    idle: Collection[int] = (0,)
+    after: str = ""
+    below: Mapping[str, str] = field(default_factory=dict)
+    when: str = ""
+
+    def told(self, values: Values) -> Response:
+        """Return what it does by `values`; nothing to tell where none of its limits is set."""
+        limits = [f"{values[name]:g} {unit}" for name, unit in self.below.items() if values[name]]
+        if self.below and not limits:
+            return Response("", acts=False)
+        number, set_to = int(values[self.decides]), f"{self.decides} {values[self.decides]:g}"
+        does = dict(enumerate(self.does, 1)).get(number, "")
+        if does:
+            text = f"{does.format_map(values)} ({set_to})"
+        elif number in self.idle:
+            return Response(f"{self.when}does nothing ({set_to})", acts=False)
+        else:
+            text = f"does what {set_to} says, which is not known here"
+        text += f" after {values[self.after]:g} s ({self.after})" if self.after else ""
+        text += f" at {' or '.join(limits)}" if limits else ""
+        return Response(f"{self.when}{text}", number not in self.idle)
+
+
+@dataclass(frozen=True, slots=True)
 class Failsafe:
     """What a vehicle does when `loss`, the beginning of a sentence, happens in flight.
 
-    `response(values, streamed)` is what it does by the values of its parameters, in a flight by
-    setpoints (`streamed`) or by its mission; it raises KeyError for one that decides and is
-    missing. `defaults` are those of the autopilot; a whole number is one of 32 bits on PX4's wire.
-    `absent` has the values that count in versions that lack the parameter.
+    Attributes:
+        defaults: the parameters that decide, with the autopilot's defaults; a whole number is one
+            of 32 bits on PX4's wire.
+        actions: what it does, by its parameters; without any it always does what `always` says.
+        off: the values of parameters with which it does nothing.
+        exceptions: the parameter, and its bits in a mission and in a flight by setpoints, by which
+            it flies on.
+        absent: the values that count in versions that lack the parameter.
     """
 
     loss: str
     defaults: Values
-    response: Callable[[Values, bool], Response]
+    actions: tuple[Action, ...] = ()
+    always: str = ""
+    off: Mapping[str, Collection[float]] = field(default_factory=dict)
+    exceptions: tuple[str, int, int] | None = None
     absent: Values = field(default_factory=dict)
 
     def told(self, values: Values, *, streamed: bool) -> Response | None:
         """Return what a vehicle with these `values` does; None where one that decides is missing.
 
-        >>> def response(values, streamed):
-        ...     return Response("returns") if values["FS"] else Response("flies on", acts=False)
-        >>> failsafe = Failsafe("RC lost", {"FS": 1.0}, response)
+        `streamed`: in a flight by setpoints, else by its mission.
+
+        >>> failsafe = Failsafe("RC lost", {"FS": 1.0}, (Action("FS", ("returns",)),))
+        >>> failsafe.told({"FS": 1.0}, streamed=False)
+        Response(text='returns (FS 1)', acts=True)
         >>> failsafe.told({"FS": 0.0}, streamed=False)
-        Response(text='flies on', acts=False)
+        Response(text='does nothing (FS 0)', acts=False)
         >>> failsafe.told({}, streamed=False) is None
         True
         """
+        values = {**self.absent, **values}
         try:
-            return self.response({**self.absent, **values}, streamed)
+            for name, off in self.off.items():
+                if values[name] in off:
+                    return Response(f"does nothing ({name} {values[name]:g})", acts=False)
+            told = [action.told(values) for action in self.actions]
+            acts = self.always != "" or any(each.acts for each in told)
+            if acts and self.exceptions is not None:
+                name, *bits = self.exceptions
+                if int(values[name]) & bits[streamed]:
+                    return Response(f"flies on ({name} {values[name]:g})", acts=False)
         except KeyError:
             return None
-
-
-def setting(name: str, values: Values) -> str:
-    """Return a parameter with its value, as a message shows it."""
-    return f"{name} {values[name]:g}"
-
-
-def chosen(name: str, values: Values, actions: Mapping[int, str]) -> Response:
-    """Return what `actions` say of the value of the parameter `name`; 0 is for nothing.
-
-    >>> chosen("GF", {"GF": 2.0}, {2: "holds"})
-    Response(text='holds (GF 2)', acts=True)
-    >>> chosen("GF", {"GF": 0.0}, {2: "holds"}).text, chosen("GF", {"GF": 9.0}, {}).text
-    ('does nothing (GF 0)', 'does what GF 9 says, which is not known here')
-    """
-    number, told = int(values[name]), setting(name, values)
-    if number == 0 and 0 not in actions:
-        return Response(f"does nothing ({told})", acts=False)
-    if number not in actions:
-        return Response(f"does what {told} says, which is not known here")
-    return Response(f"{actions[number]} ({told})")
+        text = "; ".join(each.text for each in told if each.text)
+        nothing = f"does nothing: {' and '.join(self.actions[0].below)} are 0" if told else ""
+        return Response(text or self.always or nothing, acts)

@@ -278,7 +278,7 @@ LOSSES: tuple[tuple[str, dict[str, float], str, str, Level], ...] = (
     ("ardupilot", {"FS_OPTIONS": 1}, "rc-lost", "flies on (FS_OPTIONS 1)", Level.WARNING),
     ("ardupilot", {}, "ground-station-lost", "nothing (FS_GCS_ENABLE 0)", Level.WARNING),
     ("ardupilot", {"FS_GCS_ENABLE": 5}, "ground-station-lost", "after 5 s", Level.NOTE),
-    ("ardupilot", {"BATT_MONITOR": 0}, "battery-low", "measures none", Level.WARNING),
+    ("ardupilot", {"BATT_MONITOR": 0}, "battery-low", "nothing (BATT_MONITOR 0)", Level.WARNING),
     (
         "ardupilot",
         {"BATT_FS_LOW_ACT": 2, "BATT_LOW_MAH": 300},
@@ -293,7 +293,7 @@ LOSSES: tuple[tuple[str, dict[str, float], str, str, Level], ...] = (
     ("px4", {"COM_RCL_EXCEPT": 1}, "rc-lost", "flies on", Level.WARNING),
     ("px4", {}, "ground-station-lost", "does nothing (NAV_DLL_ACT 0)", Level.WARNING),
     ("px4", {"NAV_DLL_ACT": 2}, "ground-station-lost", "after 10 s", Level.NOTE),
-    ("px4", {"COM_LOW_BAT_ACT": 3}, "battery-low", "returns at 7 %, lands", Level.NOTE),
+    ("px4", {"COM_LOW_BAT_ACT": 3}, "battery-low", "at 0.07 of its charge, lands", Level.NOTE),
     ("px4", {"RTL_RETURN_ALT": 30.0}, "return", "30 m above home", Level.NOTE),
     ("px4", {}, "fence-left", "it holds (GF_ACTION)", Level.NOTE),
     ("px4", {"GF_ACTION": 1}, "fence-left", "it says so and flies on (GF_ACTION)", Level.WARNING),
