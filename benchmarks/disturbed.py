@@ -28,7 +28,6 @@ from faao_mav.fly.fly import FlightReport, fly
 from faao_mav.fly.seen import Flight
 from faao_mav.fly.watch import Watch
 from faao_mav.plan import parse_plan
-from faao_mav.schedule.prediction import price_flight
 from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import link
 from faao_mav.wire.client import upload
@@ -129,8 +128,7 @@ def delivered(result: Result, report: FlightReport) -> str:
         ending += f" ({report.ending.text})"
     if report.relay_start is None:
         return f"{ending}, -"
-    t, w = report.record.line(result.solution)
-    real = price_flight(result.solution, t - report.relay_start, w)
+    real = report.record.line(result.solution, report.relay_start).priced(result.solution)
     share = 100 * real.delivered_rate / result.solution.delivered_rate
     return f"{ending}, {share:.2f} %, {real.rms_position_error:.2f} m rms"
 

@@ -161,8 +161,7 @@ def streamed(autopilots: Path, autopilot: str, result: Result, folder: Path) -> 
         report = fly(flight, connection, rate=10, wait=60)
     if report.relay_start is None or report.ending is None or report.ending.kind != "finished":
         raise SystemExit(f"not flown: {report.ending}")
-    t, w = report.record.line(solution)
-    return price_flight(solution, t - report.relay_start, w)
+    return report.record.line(solution, report.relay_start).priced(solution)
 
 
 @contextmanager

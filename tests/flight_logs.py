@@ -14,9 +14,14 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from faao_mav.arrays import Real
-from faao_mav.fly.record import FlightRecord
+from faao_mav.validate.flown import FlightRecord
 
 _NONE: Mapping[str, float] = {}
+
+
+def heights(record: FlightRecord) -> Real:
+    """Return how high it was above home as that was then, m."""
+    return record.altitude - record.home
 
 
 def kept(record: FlightRecord, which: Any) -> FlightRecord:

@@ -91,6 +91,13 @@ class Track:
         """Whether the flight ends on the ground."""
         return bool(self.position[-1, 2] < _GROUND)
 
+    def within(self, frame: LocalFrame) -> Real:
+        """Return the positions (n, 3), m, in another `frame`."""
+        if self.frame == frame:
+            return self.position
+        ground = frame.to_local(*self.frame.to_geodetic(self.position[:, :2]))
+        return np.column_stack([ground, self.position[:, 2]])
+
 
 class FlightModel(Protocol):
     """How a vehicle with given parameters flies a path."""

@@ -48,7 +48,6 @@ def debrief(
     from faao_mav.fly.radio import Radios
     from faao_mav.report.debrief import FromLog
     from faao_mav.report.lines import joined
-    from faao_mav.validate.flown import Line
     from faao_mav.workflow import Result, with_mission
 
     records = read_log(log, system)
@@ -63,6 +62,5 @@ def debrief(
         write_whole(report, page.encode())
     show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
     if radios is not None:
-        flight = told.record.line(solution)
-        count = radios.replay(Line(flight.t - told.found.start, flight.w))
+        count = radios.replay(told.record.line(solution, told.found.start))
         note(f"{count} slots were told to {radio}")

@@ -6,12 +6,12 @@ from typing import Unpack
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.record import FlightRecord
 from faao_mav.fly.seen import Flight, read_held
 from faao_mav.fly.start import Start
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import POSITION_RATE, Ending
 from faao_mav.fly.watch import Watch
+from faao_mav.validate.flown import FlightRecord
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from faao_mav.errors import InputError, check_extra, shortened
-from faao_mav.fly.record import Fix, FlightRecord
+from faao_mav.validate.flown import Fix, FlightRecord
 
 Said: TypeAlias = tuple[int, int, str, Mapping[str, Any]]
 """System and component of MAVLink that said it, 0 in a vehicle's own log; name; values by field."""

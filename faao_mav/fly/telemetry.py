@@ -4,8 +4,8 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from faao_mav.fly.record import Fix, FlightRecord
 from faao_mav.mission.item import Home
+from faao_mav.validate.flown import Fix, FlightRecord
 from faao_mav.wire.messages import (
     BatteryStatus,
     CommandLong,

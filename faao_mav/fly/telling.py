@@ -8,10 +8,17 @@ from typing import Any
 from faao_mav.autopilot import Track
 from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.radio import Radios
-from faao_mav.fly.record import FlightRecord, predicted_line
 from faao_mav.fly.watch import Watch
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.flown import Debriefing, Line, Standing, plan_start, standing
+from faao_mav.validate.comparison import predicted_line
+from faao_mav.validate.flown import (
+    Debriefing,
+    FlightRecord,
+    Standing,
+    debriefing,
+    plan_start,
+    standing,
+)
 from faao_mav.validate.rule import Finding, Level
 from faao_mav.validate.words import by_rule, count_of, line_of
 
@@ -69,19 +76,20 @@ class Telling:
         """Return what became of the plan; None without one, or without its flight."""
         if self._solution is None or self._line is None or not len(report.record.t):
             return None
-        return report.record.debriefing(self._solution, self._line, report.relay_start)
+        return debriefing(self._solution, self._line, report.record, report.relay_start)
 
     def _standing(self, watch: Watch) -> Standing | None:
         """Return how the flight stands; None before it has left w_I, and when it is over."""
         before = watch.phase in ("checking", "engaging", "arming", "starting", "waiting")
         if self._solution is None or self._line is None or before:
             return None
-        flight, start = watch.seen.record().line(self._solution), watch.relay_start
+        record, start = watch.seen.record(), watch.relay_start
         if start is None and not watch.streams:
+            flight = record.line(self._solution)
             self._start = start = plan_start(self._solution, self._line, flight)
         if start is None:
             return None
-        stands = standing(self._solution, self._line, Line(flight.t - start, flight.w))
+        stands = standing(self._solution, self._line, record.line(self._solution, start))
         return None if stands.over else stands
 
 

@@ -8,10 +8,10 @@ from typing import Any
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
-from faao_mav.fly.record import FlightRecord, predicted_line
 from faao_mav.report.flights import debriefing_lines
 from faao_mav.report.lines import Line
-from faao_mav.validate.flown import Debriefing
+from faao_mav.validate.comparison import predicted_line
+from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
 from faao_mav.workflow import Result, debriefing_as_dict
 
 _SAME = 1e-5
@@ -46,7 +46,7 @@ class FromLog:
         Raises `FaaoError` where none is.
         """
         line = predicted_line(result.solution, result.check.track if result.check else None)
-        debriefings = ((record, record.debriefing(result.solution, line)) for record in records)
+        debriefings = ((record, debriefing(result.solution, line, record)) for record in records)
         found = [(record, each) for record, each in debriefings if each is not None]
         if not found:
             longest = max(record.t[-1] - record.t[0] for record in records)

@@ -11,11 +11,11 @@ from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.initial_route import begins_at_speed, set_out
-from faao_mav.schedule.prediction import Prediction, price_flight
-from faao_mav.schedule.schedule import passing, positions_at
+from faao_mav.schedule.prediction import Prediction
+from faao_mav.schedule.schedule import passing
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.context import positions_in
 from faao_mav.validate.demands import LinkCheck, Stretch
+from faao_mav.validate.flown import Line
 from faao_mav.vector import distances_to_path, lengths
 
 _LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
@@ -35,9 +35,8 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
 
     A flight that is nowhere near the plan is compared all the same.
     """
-    t, w = on_the_plans_clock(solution, track)
-    flown, plan = price_flight(solution, t, w), solution.plan
-    during = np.interp(solution.t, t, track.position[:, 2])
+    line = predicted_line(solution, track)
+    flown, plan = line.priced(solution), solution.plan
     link = LinkCheck(
         planned_rate=solution.rates.R_avg,
         predicted_rate=flown.rates.R_avg,
@@ -52,42 +51,47 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         max_position_error=flown.max_position_error,
         path_error=flown.max_path_error,
         path_tolerance=plan.mission.path_tolerance,
-        altitude_error=float(np.abs(during - plan.flight.altitude).max()),
+        altitude_error=line.altitude_error(solution),
         worst=_worst(solution, flown),
-        away=float(distances_to_path(w[::_EVERY], solution.w).min()),
+        away=float(distances_to_path(line.w[::_EVERY], solution.w).min()),
     )
     return link, flown
 
 
-def on_the_plans_clock(solution: Solution, track: Track) -> tuple[Real, Real]:
-    """Return times (k,), s, and positions (k, 2), m, of `track` on the plan's clock, in its frame.
+def predicted_line(solution: Solution, track: Track | None) -> Line:
+    """Return the predicted flight `track` on the plan's clock; the plan itself without one.
 
     The plan begins when the flight leaves the item nearest to w_I, or up to `MOST_LEAD` later, for
     that lead for which plan and flight are closest at equal times, rms: a mission does not say its
     lead. So is the item, where several are as near. A plan that begins at speed does when the
     flight passes w_I.
     """
+    if track is None:
+        return Line.planned(solution)
     origin = solution.plan.origin
-    w = positions_in(LocalFrame(origin.latitude, origin.longitude), track)[:, :2]
-    return track.t - _start(solution, track, w), w
+    w, up = np.split(track.within(LocalFrame(origin.latitude, origin.longitude)), [2], axis=1)
+    line = Line(track.t, w, up[:, 0])
+    return line._replace(t=track.t - _start(solution, track.reached, line))
 
 
-def _start(solution: Solution, track: Track, w: Real) -> float:
-    """Return the time, s, on the clock of `track`, at `w` (k, 2), m, at which the plan begins."""
+def _start(solution: Solution, reached: Real, line: Line) -> float:
+    """Return the time, s, on the clock of `line` at which the plan begins.
+
+    Its items are done at `reached`, s, NaN where that is no time.
+    """
     waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
-    left = track.reached[np.isfinite(track.reached)]
+    left = reached[np.isfinite(reached)]
     if len(left) == 0:
-        return float(track.t[0])
-    away = lengths(positions_at(left, track.t, w) - solution.w[0])
+        return float(line.t[0])
+    away = lengths(line.at(left) - solution.w[0])
     near = left[away <= away.min() + solution.plan.mission.path_tolerance] - waited
 
     def apart(start: float) -> float:
-        at = positions_at(solution.t + start, track.t, w)
-        return float(np.mean(np.sum((at - solution.w) ** 2, axis=1)))
+        return float(np.mean(np.sum((line.at(solution.t + start) - solution.w) ** 2, axis=1)))
 
     nearest = min(map(float, near), key=apart)
     if waited == 0 and begins_at_speed(solution.t, solution.w):
-        return passing(track.t, w, solution.w[0], nearest)
+        return passing(line.t, line.w, solution.w[0], nearest)
     return min((nearest + lead for lead in map(float, _LEADS)), key=apart)
 
 

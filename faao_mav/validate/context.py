@@ -226,17 +226,7 @@ class ValidationContext:
     @cached_property
     def track_positions(self) -> Real | None:
         """The track's positions (n, 3) in the local frame, or None without a track."""
-        if self.track is None or self.frame is None:
-            return None
-        return positions_in(self.frame, self.track)
-
-
-def positions_in(frame: LocalFrame, track: Track) -> Real:
-    """Return the positions (n, 3), m, of `track` in another `frame`."""
-    if track.frame == frame:
-        return track.position
-    ground = frame.to_local(*track.frame.to_geodetic(track.position[:, :2]))
-    return np.column_stack([ground, track.position[:, 2]])
+        return None if self.track is None or self.frame is None else self.track.within(self.frame)
 
 
 def at_zero(item: MissionItem) -> bool:

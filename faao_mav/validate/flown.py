@@ -1,16 +1,15 @@
-"""A real flight beside the plan that it carries out: while it lasts, and when it is over.
-
-A flight is at `w` (k, 2), m in the plan's frame, at `t` (k,), s on a clock of its own. What it was
-predicted to be, or the plan itself where nothing was predicted, is told on the plan's clock.
-"""
+"""A flight beside the plan that it carries out: predicted, while it lasts, and when it is over."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
+from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.initial_route import set_out
 from faao_mav.schedule.prediction import Prediction, price_flight
@@ -42,10 +41,91 @@ time. Chosen."""
 
 
 class Line(NamedTuple):
-    """Where an aircraft is at which time: `t` (k,), s, and `w` (k, 2), m."""
+    """A flight in the plan's frame: at `t` (k,), s, at `w` (k, 2), m, `up` (k,) m above home.
+
+    Times count on the plan's clock, or on the vehicle's until it is known where they meet.
+    """
 
     t: Real
     w: Real
+    up: Real
+
+    @classmethod
+    def planned(cls, solution: Solution) -> "Line":
+        """Return the plan itself."""
+        return cls(solution.t, solution.w, np.full(len(solution.t), solution.plan.flight.altitude))
+
+    def at(self, times: Real) -> Real:
+        """Return where it is at `times` (n,), s: (n, 2), m."""
+        return positions_at(times, self.t, self.w)
+
+    def priced(self, solution: Solution) -> Prediction:
+        """Return what the channel of `solution` delivers along it."""
+        return price_flight(solution, self.t, self.w)
+
+    def altitude_error(self, solution: Solution) -> float:
+        """Return the greatest distance, m, from the planned height."""
+        during = np.interp(solution.t, self.t, self.up)
+        return float(np.abs(during - solution.plan.flight.altitude).max())
+
+
+class Fix(NamedTuple):
+    """A position: s on the vehicle's clock, degrees, m above the sea, and m/s of wind."""
+
+    t: float
+    latitude: float
+    longitude: float
+    altitude: float
+    home: float
+    east: float = math.nan
+    north: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlightRecord:
+    """Where a vehicle was, by its own estimate, as telemetry or a log tells it.
+
+    `t` (k,), s, is the vehicle's clock, which increases; `latitude` and `longitude` (k,) are
+    degrees; `altitude` and `home` (k,) are how high it and its home were above the sea, m: home may
+    be set again. `wind` (k, 2) is the wind as it was estimated, m/s towards east and north, NaN
+    where that is not known. `parameters` are those that a log names. `system` is the number by
+    which it told that over MAVLink.
+    """
+
+    t: Real
+    latitude: Real
+    longitude: Real
+    altitude: Real
+    home: Real
+    wind: Real
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    system: int | None = None
+
+    @classmethod
+    def of(
+        cls, fixes: ArrayLike, parameters: Mapping[str, float] | None = None, system: int = 0
+    ) -> "FlightRecord":
+        """Return the record of positions, each a `Fix`."""
+        t, latitude, longitude, altitude, home, *wind = np.reshape(fixes, (-1, len(Fix._fields))).T
+        place = latitude, longitude, altitude, home
+        return cls(t, *place, np.stack(wind, axis=1), parameters or {}, system or None)
+
+    def mean_wind(self, start: float, duration: float) -> Real | None:
+        """Return the mean (2,) of the wind in that time, None where nothing was estimated."""
+        during = (self.t >= start) & (self.t <= start + duration)
+        values = self.wind[during & np.isfinite(self.wind).all(axis=1)]
+        return np.asarray(values.mean(axis=0)) if len(values) else None
+
+    def line(self, solution: Solution, start: float = 0.0) -> Line:
+        """Return it in the frame of the plan, whose clock reads 0 at `start`, s; as high as then.
+
+        That is: above home as it was at `start`.
+        """
+        origin = solution.plan.origin
+        frame = LocalFrame(origin.latitude, origin.longitude)
+        home = self.home[max(0, int(np.searchsorted(self.t, start, "right")) - 1)]
+        w = np.asarray(frame.to_local(self.latitude, self.longitude))
+        return Line(self.t - start, w, self.altitude - home)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +167,26 @@ class Debriefing:
     altitude_error: float
 
 
-def planned_line(solution: Solution) -> Line:
-    """Return the plan itself as a prediction."""
-    return Line(solution.t, solution.w)
+def debriefing(
+    solution: Solution, predicted: Line, record: FlightRecord, start: float | None = None
+) -> Debriefing | None:
+    """Return what became of the plan in the flight of `record`; None: it is not in there.
+
+    `start` is when the plan's clock read 0, s on the vehicle's; None: that is searched.
+    """
+    if start is None:
+        start = plan_start(solution, predicted, record.line(solution))
+    if start is None:
+        return None
+    flight = record.line(solution, start)
+    return Debriefing(
+        solution=solution,
+        predicted=predicted.priced(solution),
+        flown=flight.priced(solution),
+        start=start,
+        missing=max(0.0, float(solution.t[-1] - flight.t[-1])),
+        altitude_error=flight.altitude_error(solution),
+    )
 
 
 def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | None:
@@ -100,8 +197,8 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     the plan's own, which setpoints follow. What the flight does later does not move the clock: who
     pauses on the way is late from there on.
     """
-    found = [_departure(solution, line, flight) for line in (predicted, planned_line(solution))]
-    off, start = min(found)
+    lines = (predicted, Line.planned(solution))
+    off, start = min(_departure(solution, line, flight) for line in lines)
     return start if off <= _ALIKE else None
 
 
@@ -117,19 +214,19 @@ def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, flo
     reach = min(_REACH, float(away.max()) / 2)
     end = float(line.t[after][np.argmax(away >= reach)])
     t = np.linspace(begin, end, max(2, round((end - begin) / 0.2)))
-    w = positions_at(t, *line)
+    w = line.at(t)
     first, last = float(flight.t[0]) - begin, float(flight.t[-1]) - end
     if last < first:
         return math.inf, 0.0
 
     def nearest(starts: Real) -> tuple[float, float]:
         """Return the least mean square distance of these `starts`, m², and the one that has it."""
-        at = positions_at((starts[:, None] + t).ravel(), *flight).reshape(len(starts), *w.shape)
+        at = flight.at((starts[:, None] + t).ravel()).reshape(len(starts), *w.shape)
         squares = np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1)
         return float(squares.min()), float(starts[np.argmin(squares)])
 
     coarse = np.arange(first, last + _COARSE, _COARSE)
-    around = coarse[lengths(positions_at(coarse + begin, *flight) - w[0]) < reach]
+    around = coarse[lengths(flight.at(coarse + begin) - w[0]) < reach]
     if not len(around):
         return math.inf, 0.0
     near = nearest(around)[1]
@@ -156,7 +253,7 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     return Standing(
         time=now,
         late=behind,
-        apart=float(lengths(place - positions_at(np.array([now]), *planned_line(solution)))[0]),
+        apart=float(lengths(place - Line.planned(solution).at(np.array([now])))[0]),
         astray=float(distances_to_path(place[None], solution.w)[0]),
         I_U=float(priced.I_U[slot]),
         I_G=float(priced.I_G[slot]),
@@ -166,27 +263,8 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     )
 
 
-def debriefing(
-    solution: Solution, predicted: Line, flight: Line, height: Real, start: float
-) -> Debriefing:
-    """Return what became of the plan in `flight`, at `height` (k,) m.
-
-    `start` is when the plan's clock read 0, s on the flight's.
-    """
-    t = flight.t - start
-    during = np.interp(solution.t, t, height)
-    return Debriefing(
-        solution=solution,
-        predicted=price_flight(solution, *predicted),
-        flown=price_flight(solution, t, flight.w),
-        start=start,
-        missing=max(0.0, float(solution.t[-1] - t[-1])),
-        altitude_error=float(np.abs(during - solution.plan.flight.altitude).max()),
-    )
-
-
 def late(solution: Solution, now: float, place: Real) -> float:
     """Return by how many seconds an aircraft at `place` (2,), m, is later than planned at `now`."""
     t = np.arange(0.0, float(solution.t[-1]) + 0.05, 0.1)
-    apart = lengths(positions_at(t, *planned_line(solution)) - place)
+    apart = lengths(Line.planned(solution).at(t) - place)
     return now - float(t[np.argmin(apart + _METRES_PER_SECOND * np.abs(t - now))])

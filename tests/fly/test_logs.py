@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import edited
-from flight_logs import dataflash, heard, kept, tlog, ulog
+from flight_logs import dataflash, heard, heights, kept, tlog, ulog
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
@@ -26,10 +26,10 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.fly import logs
 from faao_mav.fly.logs import Said, flights, messages, read_log
-from faao_mav.fly.record import FlightRecord
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import save_solution
 from faao_mav.plan import parse_plan
+from faao_mav.validate.flown import FlightRecord
 
 LOGS = Path(__file__).parent.parent / "data" / "logs"
 PLAN = LOGS / "plan.yaml"
@@ -148,7 +148,7 @@ def test_every_kind_of_log_tells_the_flight(
     assert record.t == pytest.approx(flight.t, abs=1e-6)
     for name in ("latitude", "longitude"):
         assert getattr(record, name) == pytest.approx(getattr(flight, name), abs=1e-7)
-    assert record.height == pytest.approx(flight.height, abs=2e-3)
+    assert heights(record) == pytest.approx(heights(flight), abs=2e-3)
     assert record.parameters == {"SPEED": 6.0}
     assert record.mean_wind(record.t[0], 1e3) == pytest.approx([2.0, 1.0])
 
@@ -282,7 +282,7 @@ def test_a_damaged_position_is_left_out_and_no_other(
     left = [k for k in range(POSITIONS) if k % 4 != 2 or k // 4 not in damaged]
     assert record.t == pytest.approx(100.0 + 0.2 * np.array(left))
     assert record.latitude == pytest.approx(-35.0 + 1e-6 * np.array(left), abs=1e-9)
-    assert record.height == pytest.approx(20.0)
+    assert heights(record) == pytest.approx(20.0)
 
 
 @pytest.mark.parametrize("kind", [bin_position, tlog_position, ulg_position])
@@ -292,16 +292,15 @@ def test_heights_are_above_home_as_it_was_then(kind: Position) -> None:
     first, none, second = ((0, 0, "home_position", home) for home in homes)
     said: list[Said] = [first, *(kind(k, 20.0, 500.0) for k in range(30)), none, second]
     record = made_of([*said, *(kind(k, 14.0, 506.0) for k in range(30, POSITIONS))])
-    for k, height in ((29, 20.0), (30, 14.0)):
-        heights = record.height_above_home_at(float(record.t[k]) + 0.1)
-        assert heights == pytest.approx(height)
+    assert record.altitude == pytest.approx(520.0)
+    assert record.home[[29, 30]] == pytest.approx([500.0, 506.0])
 
 
 def test_a_home_that_comes_late_or_never() -> None:
     said = [ulg_position(k, float(k), 500.0) for k in range(POSITIONS)]
-    assert made_of(said).height == pytest.approx(np.arange(POSITIONS))
+    assert heights(made_of(said)) == pytest.approx(np.arange(POSITIONS))
     later: list[Said] = [*said[:20], (0, 0, "home_position", {"alt": 490.0}), *said[20:]]
-    assert made_of(later).height == pytest.approx(10.0 + np.arange(POSITIONS))
+    assert heights(made_of(later)) == pytest.approx(10.0 + np.arange(POSITIONS))
 
 
 def test_wind_is_of_the_newest_that_estimates_it() -> None:
@@ -334,7 +333,7 @@ def test_the_autopilot_of_a_system_counts() -> None:
     log = [*said(1, 191, 9.0), *said(1, 1, 1.0, 20), *said(2, 1, 2.0)]
     log += [*said(3, 1, 9.0, 5), *said(3, 5, 3.0), *said(3, 191, 9.0, 30)]
     records = [FlightRecord.of(*each) for each in flights(Path("flight"), log)]
-    found = {record.system: record.height.tolist() for record in records}
+    found = {record.system: heights(record).tolist() for record in records}
     assert found == {1: [1.0] * 20, 2: [2.0] * POSITIONS, 3: [3.0] * POSITIONS}
     assert [number for *_, number in flights(Path("flight"), log, 2)] == [2]
 

@@ -34,7 +34,7 @@ def solved(fading: str) -> Solution:
 def flight(solution: Solution, late: float) -> Line:
     """Return the planned flight so many seconds late, five samples a slot."""
     t = np.arange(-5.0, solution.t[-1] + 5.0, 0.1)
-    return Line(t, np.stack([np.interp(t - late, solution.t, x) for x in solution.w.T], axis=-1))
+    return Line(t, Line.planned(solution).at(t - late), t)
 
 
 def told(solution: Solution, flown: Line) -> list[dict[str, Any]]:

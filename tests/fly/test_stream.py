@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import FLYABLE, edited
+from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import AnotherStation, Scene, starts
@@ -87,7 +88,7 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     assert found.delivered_rate > 0.997 * solution.delivered_rate
     record, begin = scene.watch.seen.record(), scene.watch.relay_start
     during = (record.t > begin) & (record.t < begin + solution.plan.flight.duration)
-    np.testing.assert_allclose(record.height[during], 6, atol=0.2)
+    np.testing.assert_allclose(heights(record)[during], 6, atol=0.2)
     steps = np.diff([each.time_boot_ms for each in setpoints(scene)])
     assert steps.min() >= 80
     assert loss or steps.max() <= 120
@@ -132,7 +133,7 @@ def test_what_it_does_when_setpoints_cease_is_told_before(
         late = record.line(low()).w[(record.t > 20.0) & (record.t < 59.0)]
         assert np.ptp(late, axis=0).max() < 0.1
     else:
-        assert record.height[-1] == pytest.approx(0.0, abs=0.1)
+        assert heights(record)[-1] == pytest.approx(0.0, abs=0.1)
 
 
 @pytest.mark.parametrize(
@@ -221,9 +222,9 @@ def test_it_ends_as_the_plan_says_inside_its_fence(finish: str) -> None:
     assert area is not None
     path = record.line(solution).w
     assert np.linalg.norm(path[-1] - (solution.w[-1] if finish == "hover" else 0)) < 1
-    assert record.height[-1] == pytest.approx(6 if finish == "hover" else 0, abs=1)
-    first = int(np.argmax(record.height > 5.9))
-    assert area.inside(1.0).covers(path[first:][record.height[first:] > 1]).all()
+    assert heights(record)[-1] == pytest.approx(6 if finish == "hover" else 0, abs=1)
+    first = int(np.argmax(heights(record) > 5.9))
+    assert area.inside(1.0).covers(path[first:][heights(record)[first:] > 1]).all()
     velocity = solution.v.copy()
     velocity[0] = [20, 0]  # its run-in begins west of the fence
     with pytest.raises(InfeasibleError, match="fence"):

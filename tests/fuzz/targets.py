@@ -13,7 +13,6 @@ from harness import Target
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import InputError, MissionFileError
 from faao_mav.fly.logs import flights, messages
-from faao_mav.fly.record import FlightRecord
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.formats import read_mission_file, render_files
@@ -24,6 +23,7 @@ from faao_mav.plan import read_plan
 from faao_mav.study import run_study
 from faao_mav.study.rows import ROWS, comparison, load_rows, table
 from faao_mav.study.sweep import make_cases, parse_vary
+from faao_mav.validate.flown import FlightRecord
 
 _DATA = Path(__file__).parent.parent / "data"
 
