@@ -46,7 +46,7 @@ class ClassRate:
     @property
     def gain(self) -> float:
         """g at the foot of the station: c times it is of the order of one to a hundred."""
-        return self.link.reference_gain / self.link.altitude**2
+        return self.link.law.reference_gain / self.link.altitude**2
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     p, H = rate.link.station / LENGTH, rate.link.altitude / LENGTH
     away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
     if isinstance(rate, Curve):
-        unit = np.log(rate.link.reference_gain / LENGTH**2)
+        unit = np.log(rate.link.law.reference_gain / LENGTH**2)
         return rate.value(unit - ca.log(ca.sum1(away**2) + H**2))
     g = H**2 / (ca.sum1(away**2) + H**2)
     D = ca.repmat(g, c.shape[0], 1) * c

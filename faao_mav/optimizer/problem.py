@@ -18,7 +18,6 @@ from faao_mav.radio.channel import (
     balanced_rayleigh,
     line_of_sight_all_ones,
     line_of_sight_ula,
-    path_gain,
     rayleigh,
     rician,
 )
@@ -26,6 +25,7 @@ from faao_mav.radio.constellation import (
     DifferenceClasses,
     difference_classes,
 )
+from faao_mav.radio.gain import PathGain
 from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.relay import RelayQueue
 
@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 class Link:
     """One hop: (1) or (2) with its share of (13).
 
-    `station` is p_B or p_U (2,), `altitude` H, `power` W_B or W_U (W), `noise` sigma² (W);
+    `station` is p_B or p_U (2,), `altitude` H, `power` W_B or W_U (W), `noise` sigma² (W), `law`
+    the path gain;
     `receive` and `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
     slot (N + 2, N_r, N_t), draws to be averaged over (S, 1, N_r, N_t), or None for the line of
     sight alone. `measure` is the rate that counts, `optimizer.rate`.
@@ -53,7 +54,7 @@ class Link:
     receive: int
     transmit: int
     modulation: str
-    reference_gain: float
+    law: PathGain
     rician_factor: float
     line_of_sight: str
     nlos: Complex | None
@@ -82,8 +83,9 @@ class Link:
         )
 
     def gain(self, w: Real) -> Real:
-        """Return rho_0 d^-2 (N + 2,) at the positions w (N + 2, 2)."""
-        return path_gain(w, self.station, self.altitude, self.reference_gain)
+        """Return the linear path gain (...) at the positions w (..., 2)."""
+        squared_distance = np.sum((w - self.station) ** 2, axis=-1) + self.altitude**2
+        return self.law.gain(squared_distance, self.altitude)
 
     def small_scale(self, w: Real) -> Complex:
         """Return H_r, the bracket of (1) or (2), at the positions w (N + 2, 2).
@@ -117,7 +119,7 @@ class Link:
         return rician(los, self.nlos, self.rician_factor)
 
     def channel(self, w: Real, H_r: Complex) -> Complex:
-        """Return H = sqrt(rho_0 d^-2) H_r, (1) or (2)."""
+        """Return H = sqrt(gain) H_r, (1) or (2), at the positions w (N + 2, 2)."""
         return np.sqrt(self.gain(w))[:, None, None] * H_r
 
     def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
@@ -278,7 +280,7 @@ def build_problem(plan: Plan) -> Problem:
             receive=receive,
             transmit=transmit,
             modulation=radio.modulation,
-            reference_gain=radio.reference_gain,
+            law=PathGain(radio.reference_gain),
             rician_factor=radio.rician_factor,
             line_of_sight=radio.line_of_sight,
             nlos=nlos,

@@ -1,7 +1,8 @@
 """The radio link of the relay, from bits to rates: (1) to (8) of the paper.
 
 - ``constellation``: the alphabets, and the differences between their vectors merged into classes;
-- ``channel``: path gain, line of sight, fading, (1) and (2);
+- ``gain``: the law of the path gain;
+- ``channel``: line of sight and fading, (1) and (2);
 - ``rate``: the rate that counts by its name, and the cutoff rate, (7) and (8), from the sums of
   ``class_sum``, which ``square_sum`` forms for square alphabets;
 - ``mutual_information``: the mutual information, (5) and (6), at fixed noises;

@@ -1,25 +1,13 @@
 """The channel of each hop: H = √(rho_0 d^-2) (√(K/(K+1)) H^LoS + √(1/(K+1)) H^NLoS), (1), (2).
 
-The functions of this module are its factors: path gain, line of sight, scattering, and their sum.
+The functions of this module are its factors: line of sight, scattering, and their sum. `gain` has
+the path gain.
 """
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
-
-
-def path_gain(w: Real, p: Real, altitude: float, rho_0: float) -> Real:
-    """Return the power gain rho_0 d^-2 of (1) and (2), d² = ||w - p||² + H², linear, (...).
-
-    `w` (..., 2) are horizontal positions of the UAV and `p` (..., 2) that of the station on the
-    ground, m; `altitude` is H, m above the station, `rho_0` the gain at 1 m, linear.
-
-    >>> path_gain(np.array([30.0, 0.0]), np.array([0.0, 0.0]), 40.0, 1e-5)
-    np.float64(4e-09)
-    """
-    away = np.asarray(w, dtype=np.float64) - np.asarray(p, dtype=np.float64)
-    return np.asarray(rho_0 / (np.sum(away**2, axis=-1) + altitude**2))[()]
 
 
 def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:

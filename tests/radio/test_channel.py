@@ -8,7 +8,6 @@ from faao_mav.errors import InputError
 from faao_mav.radio.channel import (
     line_of_sight_all_ones,
     line_of_sight_ula,
-    path_gain,
     rayleigh,
     rician,
 )
@@ -19,13 +18,6 @@ ANGLES = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1.0)
 def displacement(w: Real, p: Real, altitude: float) -> Real:
     """The vector from a station at p to the UAV at w, (3,) m east, north, up."""
     return np.array([*(w - p), altitude])
-
-
-def test_path_gain_is_the_inverse_square() -> None:
-    w = np.array([[0.0, 0.0], [300.0, 400.0]])
-    np.testing.assert_allclose(
-        path_gain(w, np.zeros(2), 100.0, 1e-5), [1e-9, 1e-5 / (500.0**2 + 100.0**2)]
-    )
 
 
 @settings(deadline=None, derandomize=True)

@@ -3,7 +3,8 @@
 A rate model answers, for one link and all slots at once, what R_n of (7) or (8) is at the position
 w_n, with first and second derivatives. A link's rate depends on w through two numbers only:
 
-- l = ln(rho_0 / d²), the logarithm of the path gain of (1) or (2), d² = ||w - p||² + H²;
+- l, the logarithm of the path gain (``radio.gain``), a function of d² = ||w - p||² + H²: in the
+  paper ln(rho_0 / d²);
 - u = (x - x_p) / d, the direction cosine along east, where the antenna arrays are rotated by it
   (``radio.line_of_sight: ula``).
 
@@ -35,6 +36,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.problem import Link
+from faao_mav.radio.gain import products
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +69,13 @@ class RateModel(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkCoordinates:
-    """The positions w as one station sees them.
+    """The positions w as the station of `link` sees them.
 
     `away` (2, ..., n) are w - p in metres, `squared_distance` (..., n) is d² in m², `gain_log`
     (..., n) is l and `cosine` (..., n) is u.
     """
 
+    link: Link
     away: Real
     squared_distance: Real
     gain_log: Real
@@ -84,22 +87,15 @@ class LinkCoordinates:
         Returns:
             R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per m².
         """
-        l_i, l_ij = self._gain_slopes()
+        l_i, l_ij = self.link.law.slopes(self.away, self.squared_distance, self.link.altitude)
         gradient = rate.by_l * l_i
-        hessian = rate.by_l * l_ij + rate.by_ll * _pairs(l_i, l_i)
+        hessian = rate.by_l * l_ij + rate.by_ll * products(l_i, l_i)
         if rate.by_u is not None and rate.by_lu is not None and rate.by_uu is not None:
             u_i, u_ij = self._cosine_slopes()
             gradient += rate.by_u * u_i
-            hessian += rate.by_u * u_ij + rate.by_uu * _pairs(u_i, u_i)
-            hessian += 2 * rate.by_lu * _pairs(l_i, u_i)
+            hessian += rate.by_u * u_ij + rate.by_uu * products(u_i, u_i)
+            hessian += 2 * rate.by_lu * products(l_i, u_i)
         return gradient, hessian
-
-    def _gain_slopes(self) -> tuple[Real, Real]:
-        """Return gradient (2, ..., n) and Hessian (3, ..., n) of l by w."""
-        l_i = -2 * self.away / self.squared_distance
-        l_ij = _pairs(l_i, l_i)
-        l_ij[[0, 2]] -= 2 / self.squared_distance
-        return l_i, l_ij
 
     def _cosine_slopes(self) -> tuple[Real, Real]:
         """Return gradient (2, ..., n) and Hessian (3, ..., n) of u = x / d by w."""
@@ -111,14 +107,10 @@ class LinkCoordinates:
         return u_i, u_ij
 
 
-def _pairs(a: Real, b: Real) -> Real:
-    """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ..., n)."""
-    return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])
-
-
 def link_coordinates(link: Link, w: Real) -> LinkCoordinates:
     """Return the coordinates of the positions w (2, ..., n), m, for the station of `link`."""
     away = np.stack([w[0] - link.station[0], w[1] - link.station[1]])
     squared_distance = np.sum(away**2, axis=0) + link.altitude**2
-    gain_log = np.log(link.gain(np.moveaxis(w, 0, -1)))
-    return LinkCoordinates(away, squared_distance, gain_log, away[0] / np.sqrt(squared_distance))
+    gain_log = link.law.log(squared_distance, link.altitude)
+    cosine = away[0] / np.sqrt(squared_distance)
+    return LinkCoordinates(link, away, squared_distance, gain_log, cosine)

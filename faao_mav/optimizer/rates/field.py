@@ -63,8 +63,8 @@ def rate_models(
     for link, distance in zip(links, farthest, strict=True):
         if kind_of(link, design):
             tabled.append(link)
-            ends = link.station + np.array([[distance, 0.0], [0.0, 0.0]])
-            spans.append(np.log(link.gain(ends)))
+            turns = link.law.turns(distance, link.altitude)
+            spans.append(link.law.log(turns**2 + link.altitude**2, link.altitude))
     tables = iter(table_rates(tabled, design, spans))
     return tuple(
         next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links

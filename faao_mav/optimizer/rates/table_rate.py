@@ -153,7 +153,7 @@ def _few_modes(link: Link) -> bool:
 def table_rates(
     links: Sequence[Link], design: Design, spans: Sequence[Real]
 ) -> tuple[TableRate, ...]:
-    """Return the rates of `links`, all of which have a `kind_of` table, for the l of `spans` (2,).
+    """Return the rates of `links`, all of which have a `kind_of` table, between the l of `spans`.
 
     Links of known draws share a table if they have one alphabet and one number of modes.
     """
@@ -166,7 +166,7 @@ def table_rates(
         slots = 1 if kind != "modes" or link.nlos is None else link.nlos.shape[-3]
         at = [_shifted(link, kind, np.full(slots, u)) for u in directions]
         shifts = np.array([shift for shift, _ in at])
-        ranges.append((float(span[0] + shifts.min()), float(span[1] + shifts.max())))
+        ranges.append((float(span.min() + shifts.min()), float(span.max() + shifts.max())))
         still = at[0] if kind == "curve" or (kind == "modes" and not moving) else None
         rates.append((link, kind, still))
     if rates and all(kind == "modes" for _, kind, _ in rates):

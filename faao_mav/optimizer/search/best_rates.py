@@ -12,7 +12,7 @@ from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 from faao_mav.radio.best_precoder import has_closed_form
 
 _SEARCHED = 25
-"""Distances at which precoders are searched where there is no table of modes. Chosen."""
+"""Gains at which precoders are searched where there is no table of modes. Chosen."""
 
 _DIRECTIONS = 257
 """Directions u over which the largest singular values are taken. Chosen."""
@@ -26,7 +26,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
     exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
-    gain_log = np.log(link.gain(link.station + np.stack([r, np.zeros_like(r)], axis=-1))).T
+    gain_log = link.law.log(r**2 + link.altitude**2, link.altitude).T
     if link.nlos is not None and not optimal.averaged:
         singular = _largest_singular_values(link, len(r))
         H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
@@ -37,13 +37,13 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
         span = np.array([gain_log.min(), gain_log.max()])
         (table,) = table_rates([link], optimal, [span])
         return table.value(gain_log, gain_log).T, not optimal.averaged and exact
-    # One distance after the other, each search starting from the precoders of the last.
+    # One gain after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
 
-    rows = np.linspace(0, len(gain_log) - 1, _SEARCHED).astype(np.intp)
-    each = SlotRate(link, optimal)
-    rates = [each.value(row, row) for row in gain_log[rows]]
-    return np.asarray(CubicSpline(rows, rates)(np.arange(len(gain_log)))).T, exact
+    levels = np.linspace(gain_log.min(), gain_log.max(), _SEARCHED)
+    each, every = SlotRate(link, optimal), np.ones(len(r))
+    rates = [each.value(level * every, every) for level in levels]
+    return np.asarray(CubicSpline(levels, rates)(gain_log[:, 0])).T, exact
 
 
 def _largest_singular_values(link: Link, slots: int) -> Real:

@@ -1,0 +1,117 @@
+"""The path gain of a link as a function of place: the law that everything else asks.
+
+In dB it is
+
+    rho_0 - 10 n log10(d) + c_1 s + c_2 s^2 + c_3 s^3,  s = H / d,
+
+with d the distance between the antennas, m, and H the height of the one over the other, so that s
+is the sine of the elevation. The paper's rho_0 d^-2 is n = 2 without elevation terms. What the
+antennas' patterns and the ground do over the elevation is in c_1 to c_3.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from faao_mav.arrays import Real
+
+PER_DB = float(np.log(10.0) / 10.0)
+"""The natural logarithm of a gain of 1 dB."""
+
+
+@dataclass(frozen=True)
+class PathGain:
+    """A law of the path gain: rho_0 = `reference_gain` (linear, at 1 m), n, and c_1, c_2, ... (dB).
+
+    >>> law = PathGain(1e-5, elevation_db=(6.0, -2.0))
+    >>> law.db(np.array([0.0, 30.0]), 40.0).round(2)  # s = 1 and s = 0.8
+    array([-78.04, -80.46])
+    """
+
+    reference_gain: float
+    exponent: float = 2.0
+    elevation_db: tuple[float, ...] = ()
+
+    def gain(self, squared_distance: Real, height: float) -> Real:
+        """Return the linear gain at d² (...), m², the one antenna `height` m above the other."""
+        beyond = self._beyond_square_law(squared_distance, height)
+        return np.asarray(self.reference_gain / squared_distance * np.exp(beyond))
+
+    def log(self, squared_distance: Real, height: float) -> Real:
+        """Return l, the natural logarithm of `gain`, (...)."""
+        beyond = self._beyond_square_law(squared_distance, height)
+        return np.asarray(np.log(self.reference_gain / squared_distance) + beyond)
+
+    def db(self, distance: Real, height: float) -> Real:
+        """Return the gain in dB at horizontal distances (...), m."""
+        return self.log(np.asarray(distance) ** 2 + height**2, height) / PER_DB
+
+    def slopes(self, away: Real, squared_distance: Real, height: float) -> tuple[Real, Real]:
+        """Return gradient (2, ...) and Hessian (3, ...) of l by place, at w - p = `away` (2, ...).
+
+        The Hessian's entries are xx, xy and yy. With t = ln d², both are those of t times l_t and
+        l_tt, where d s / d t = -s / 2.
+        """
+        s = height / np.sqrt(squared_distance)
+        by_t = -self.exponent / 2 + self._elevation(s, 1)
+        bent = self._elevation(s, 2)
+        t_i = 2 * away / squared_distance
+        hessian = (bent - by_t) * products(t_i, t_i)
+        hessian[[0, 2]] += by_t * (2 / squared_distance)
+        return by_t * t_i, hessian
+
+    def turns(self, farthest: float, height: float) -> Real:
+        """Return where l turns, as distances on the ground (k,) from 0 to `farthest`, m.
+
+        Between two of them l is monotone: the extreme gains up to `farthest` are at two of them.
+
+        >>> PathGain(1e-5).turns(900.0, 100.0).tolist()
+        [0.0, 900.0]
+        >>> PathGain(1e-5, elevation_db=(0.0, -10.0)).turns(900.0, 100.0).round(1).tolist()
+        [0.0, 114.1, 900.0]
+        """
+        found = np.empty(0)
+        if height:
+            terms = [k * c for k, c in enumerate(self._terms, 1)]
+            roots = np.roots([*terms[::-1], self.exponent])  # of -2 l_t, a polynomial of s
+            s = roots.real[np.abs(roots.imag) < _REAL * np.abs(roots)]
+            s = s[(s / height > 0) & (np.abs(s) <= 1)]
+            found = np.sqrt(np.maximum(0.0, (height / s) ** 2 - height**2))
+        return np.array([0.0, *np.sort(found[found < farthest]), farthest])
+
+    def best_distance(self, farthest: float, height: float) -> float:
+        """Return the horizontal distance up to `farthest`, m, at which the gain is highest.
+
+        >>> PathGain(1e-5).best_distance(900.0, 100.0)
+        0.0
+        """
+        distances = self.turns(farthest, height)
+        return float(distances[np.argmax(self.log(distances**2 + height**2, height))])
+
+    @cached_property
+    def _terms(self) -> Real:
+        """The terms c_1, c_2, ... in natural logarithms, (k,)."""
+        return PER_DB * np.array(self.elevation_db, dtype=np.float64)
+
+    def _elevation(self, s: Real, order: int) -> Real:
+        """Return the terms of the elevation, or their derivative by t of an `order`, at s (...)."""
+        total = np.zeros_like(s)
+        for k in range(len(self._terms), 0, -1):
+            total = (total + (-k / 2) ** order * self._terms[k - 1]) * s
+        return total
+
+    def _beyond_square_law(self, squared_distance: Real, height: float) -> Real:
+        """Return ln of the gain over rho_0 d^-2, (...)."""
+        s = height / np.sqrt(squared_distance)
+        return (1 - self.exponent / 2) * np.log(squared_distance) + self._elevation(s, 0)
+
+
+_REAL = 1e-6
+"""The imaginary part, in its size, up to which a root is real: a double root splits by rounding. A
+distance too many does no harm."""
+
+
+def products(a: Real, b: Real) -> Real:
+    """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ...), for a, b (2, ...)."""
+    return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])
