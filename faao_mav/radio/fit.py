@@ -1,0 +1,309 @@
+"""The law of a link's path gain, fitted to what was measured in flight.
+
+The law is `gain_db` = level - 10 n log10 d + c_1 s + c_2 s² + ..., with d the distance to the
+station's antenna, m, and s = H/d the sine of the elevation at which it sees the UAV. Antennas'
+patterns and the ground's reflection are in the terms of s; what no law of place can say, shadowing,
+is the spread that is left.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from faao_mav.arrays import Integers, Real
+from faao_mav.errors import InputError
+
+TERMS = 3
+"""Terms of the elevation that a law has at most: of flights at five heights more gain nothing."""
+
+SPREAD_OF_NO_LAW = 10.0
+"""The spread, dB, beyond which no law of place is said to hold: twice that of open country."""
+
+_PAPER = (False, 0)
+"""The law d^-2 of the paper: its exponent is given, it has no terms of the elevation."""
+
+_ROBUST = 2.5
+"""Residuals beyond so many of their spreads count by their size, not its square (Huber)."""
+
+_TURN, _LEAST, _MOST_LEGS = math.radians(45.0), 10, 100
+"""A leg ends where its course has turned by so much, after so many means, or after so many as make
+so many legs. Chosen: each leg is left out once."""
+
+_PACE = 1.0
+"""Metres between two means below which they are a hover's, which has no course. Chosen."""
+
+_APART = 10.0
+"""Metres between heights that are left out one by one. Chosen: twice what a copter holds."""
+
+_SWING = 40.0
+"""dB by which the terms of the elevation may differ from the horizon to the zenith. Chosen: deeper
+nulls of antennas are no polynomial's, and beyond what was flown one may do anything."""
+
+_PAYS = 0.002
+"""The share of the error that more parameters must save. Chosen: less is chance."""
+
+_LAGS = np.arange(0.0, 310.0, 10.0)
+"""Bounds, m, of the distances between two places at which residuals are compared. Chosen."""
+
+_MOST_PAIRED = 2000
+"""Means of a flight that are compared with each other at most, for time and memory. Chosen."""
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """What was measured in a flight: `t` (k,), s, the UAV's `place` (k, 3), m, and `level` (k,).
+
+    Places are east, north and up of the station's antenna. The level is the gain, dB, or the gain
+    within a constant, such as a received power, dBm. `source` names the log.
+    """
+
+    t: Real
+    place: Real
+    level: Real
+    source: str = ""
+
+    def means(self, seconds: float) -> "Samples":
+        """Return means over `seconds` of time, of the power and of the place, in flight.
+
+        That is against fast fading. In flight is above half the median height; what is not finite
+        is left out.
+        """
+        sound = np.isfinite(self.t) & np.isfinite(self.level) & np.isfinite(self.place).all(axis=1)
+        sound &= self.place[:, 2] > 0.0
+        if not sound.any():
+            return Samples(self.t[:0], self.place[:0], self.level[:0], self.source)
+        sound &= self.place[:, 2] > 0.5 * np.median(self.place[sound, 2])
+        t, place, power = self.t[sound], self.place[sound], 10.0 ** (self.level[sound] / 10.0)
+        _, group, count = np.unique(np.floor(t / seconds), return_inverse=True, return_counts=True)
+
+        def mean(x: Real) -> Real:
+            return np.asarray(np.bincount(group, x) / count)
+
+        places = np.stack([mean(x) for x in place.T], axis=1)
+        return Samples(mean(t), places, 10.0 * np.log10(mean(power)), self.source)
+
+
+@dataclass(frozen=True, slots=True)
+class LinkFit:
+    """A law of the path gain with what is known of its errors; see the module for the equation.
+
+    `level` is the gain at 1 m, dB, within the constant of what was measured; `exponent` is n and
+    `elevation` are c_1, c_2, ..., dB. `errors` are one standard error of level, exponent (0 where
+    it is given) and terms, by leaving out legs one by one; `error` is that of the gain where it was
+    flown, dB. `spread` is the rms of measured against fitted, dB, at what was left out of a fit, as
+    is `paper_spread`, that of d^-2; `correlation` is the distance, m, over which the correlation of
+    residuals falls to 1/e. `flights` are the means it rests on; `legs` and `heights` are how many
+    were left out one by one.
+    """
+
+    level: float
+    exponent: float
+    elevation: tuple[float, ...]
+    errors: tuple[float, ...]
+    error: float
+    spread: float
+    paper_spread: float
+    correlation: float
+    legs: int
+    heights: int
+    flights: tuple[Samples, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether a law of place says anything: what is left is not beyond `SPREAD_OF_NO_LAW`."""
+        return self.spread <= SPREAD_OF_NO_LAW
+
+    @property
+    def count(self) -> int:
+        """The number of means."""
+        return sum(len(flight.t) for flight in self.flights)
+
+    def gain_db(self, place: Real) -> Real:
+        """Return the fitted level, dB, at `place` (..., 3), m from the station's antenna."""
+        d = np.linalg.norm(place, axis=-1)
+        s = place[..., 2] / d
+        terms = sum((c * s**k for k, c in enumerate(self.elevation, 1)), np.zeros_like(d))
+        return np.asarray(self.level - 10.0 * self.exponent * np.log10(d) + terms)
+
+
+def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
+    """Return the law for what was measured in `flights`, by means over `seconds`.
+
+    Of the laws with the exponent 2 or a free one and up to `TERMS` terms of the elevation it is
+    that with the least rms error at what is left out of the fit: each leg in turn and, where
+    several heights were flown, each height. More parameters have to pay. Least squares are robust
+    (Huber). Raises `InputError` where there are fewer than ten means in flight, or all at one
+    place.
+    """
+    means = tuple(flight.means(seconds) for flight in flights)
+    place = np.concatenate([each.place for each in means])
+    level = np.concatenate([each.level for each in means])
+    if len(level) < _LEAST:
+        text = f"{len(level)} means over {seconds:g} s in flight; expected at least {_LEAST}"
+        raise InputError(f"{_sources(means)}: {text}")
+    if np.ptp(place, axis=0).max() < 1.0:
+        raise InputError(f"{_sources(means)}: one place alone; expected a flight")
+    legs = _legs(means)
+    heights = _heights(place[:, 2], legs)
+    parts = [part for part in (legs, heights) if part.max() > 0]
+
+    def errors(law: tuple[bool, int]) -> list[float]:
+        A, y = _linear(place, level, *law)
+        return [_rms(_left_out(A, y, part)) for part in parts]
+
+    best, spread = _PAPER, errors(_PAPER)
+    for law in sorted(product((False, True), range(TERMS + 1)), key=lambda law: sum(law)):
+        if parts and law != _PAPER and not _wild(*_linear(place, level, *law), law):
+            tried = errors(law)
+            if np.mean(tried) < (1.0 - _PAYS) * np.mean(spread):
+                best, spread = law, tried
+    return _with_errors(means, best, legs, spread, errors(_PAPER), int(heights.max()) + 1)
+
+
+def _with_errors(
+    means: tuple[Samples, ...],
+    law: tuple[bool, int],
+    legs: Integers,
+    spread: list[float],
+    paper: list[float],
+    heights: int,
+) -> LinkFit:
+    """Return the fit of `law` to `means`, its errors by the jackknife over `legs`."""
+    place = np.concatenate([each.place for each in means])
+    level = np.concatenate([each.level for each in means])
+    A, y = _linear(place, level, *law)
+    c = _robust(A, y)
+    residual = y - A @ c
+    count = int(legs.max()) + 1
+    error, at_places = np.full(len(c), np.inf), np.full(1, np.inf)
+    if count > 1:
+        without = np.array([_robust(A[legs != leg], y[legs != leg]) for leg in range(count)])
+        away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
+        error = np.sqrt(np.sum(away**2, axis=0))
+        at_places = np.sqrt(np.sum((A @ away.T) ** 2, axis=1))
+    free, terms = law
+    return LinkFit(
+        level=float(c[0]),
+        exponent=float(c[1]) if free else 2.0,
+        elevation=tuple(map(float, c[len(c) - terms :])),
+        errors=(float(error[0]), float(error[1]) if free else 0.0, *error[len(c) - terms :]),
+        error=_rms(at_places),
+        spread=spread[-1] if spread else _rms(residual),
+        paper_spread=paper[-1] if paper else _rms(residual),
+        correlation=_correlation(means, residual),
+        legs=count,
+        heights=heights,
+        flights=means,
+    )
+
+
+def _linear(place: Real, level: Real, free: bool, terms: int) -> tuple[Real, Real]:
+    """Return A (k, m) and y (k,) of the law's least squares y = A c: level, exponent, terms."""
+    d = np.linalg.norm(place, axis=-1)
+    slope, s = -10.0 * np.log10(d), place[:, 2] / d
+    columns = [np.ones_like(d), *([slope] if free else []), *(s**k for k in range(1, terms + 1))]
+    return np.stack(columns, axis=1), level if free else level - 2.0 * slope
+
+
+def _robust(A: Real, y: Real) -> Real:
+    """Return the c (m,) for which A c is nearest to y by Huber's measure, reweighted in turn."""
+    weight = np.ones_like(y)
+    for _ in range(20):
+        root = np.sqrt(weight)
+        c = np.asarray(np.linalg.lstsq(A * root[:, None], y * root, rcond=None)[0])
+        away = np.abs(y - A @ c)
+        spread = 1.4826 * float(np.median(away))
+        if spread == 0.0:
+            break
+        weight = np.minimum(1.0, _ROBUST * spread / np.maximum(away, spread))
+    return c
+
+
+def _left_out(A: Real, y: Real, part: Integers) -> Real:
+    """Return the errors (k,) of a fit where each `part` (k,) in turn was left out of it."""
+    error = np.empty_like(y)
+    for number in range(int(part.max()) + 1):
+        out = part == number
+        error[out] = y[out] - A[out] @ _robust(A[~out], y[~out])
+    return error
+
+
+def _wild(A: Real, y: Real, law: tuple[bool, int]) -> bool:
+    """Whether the fitted terms of the elevation go beyond what antennas do, where none flew."""
+    terms = law[1]
+    s = np.linspace(0.0, 1.0, 101)[:, None] ** np.arange(1, terms + 1)
+    return terms > 0 and float(np.ptp(s @ _robust(A, y)[-terms:])) > _SWING
+
+
+def _legs(means: Sequence[Samples]) -> Integers:
+    """Return the number of each mean's leg, (k,): a flight's stretch without a turn."""
+    numbers, leg = list[int](), -1
+    least = max(_LEAST, sum(len(flight.t) for flight in means) // _MOST_LEGS)
+    for flight in means:
+        steps = np.diff(flight.place[:, :2], axis=0, prepend=flight.place[:1, :2])
+        course = np.where(np.hypot(*steps.T) > _PACE, np.arctan2(*steps.T), math.nan)
+        leg, first, count = leg + 1, math.nan, 0
+        for toward in course.tolist():
+            turned = abs(math.remainder(toward - first, 2.0 * math.pi))
+            if turned > _TURN and count >= least:  # a hover, whose course is NaN, does not turn
+                leg, first, count = leg + 1, toward, 0
+            first = toward if math.isnan(first) else first
+            count += 1
+            numbers.append(leg)
+    return np.array(numbers)
+
+
+def _heights(up: Real, legs: Integers) -> Integers:
+    """Return the number of each mean's height, (k,): that of a level leg, or the nearest one's.
+
+    `up` (k,) are heights, m; those of different numbers are `_APART` apart.
+    """
+    flown = [up[legs == leg] for leg in range(int(legs.max()) + 1)]
+    level = np.sort([np.median(leg) for leg in flown if np.ptp(leg) < _APART])
+    if len(level) == 0:
+        return np.zeros(len(up), dtype=np.int_)
+    cuts = np.flatnonzero(np.diff(level) > _APART)
+    return np.searchsorted((level[cuts] + level[cuts + 1]) / 2.0, up)
+
+
+def _correlation(means: Sequence[Samples], residual: Real) -> float:
+    """Return the L, m, for which exp(-distance/L) is nearest to the residuals' correlation."""
+    total, pairs, begin = np.zeros(len(_LAGS) - 1), np.zeros(len(_LAGS) - 1), 0
+    for flight in means:
+        every = -(-len(flight.t) // _MOST_PAIRED)
+        rest = residual[begin : begin + len(flight.t)][::every]
+        begin += len(flight.t)
+        for away, product_ in _pairs(flight.place[::every], rest):
+            lag = np.digitize(away, _LAGS) - 1
+            near = lag < len(pairs)
+            total += np.bincount(lag[near], product_[near], len(pairs))
+            pairs += np.bincount(lag[near], minlength=len(pairs))
+    power = float(np.mean(residual**2))
+    if power == 0.0:
+        return 0.0
+    middle, found = _LAGS[:-1] + 5.0, pairs > 0
+    correlation = total[found] / pairs[found] / power
+
+    def apart(log: float) -> float:
+        model = np.exp(-middle[found] * math.exp(-log))
+        return float(np.sum(pairs[found] * (correlation - model) ** 2))
+
+    return math.exp(float(minimize_scalar(apart, bounds=(0.0, 7.0), method="bounded").x))
+
+
+def _pairs(place: Real, residual: Real) -> Iterator[tuple[Real, Real]]:
+    """Yield the distances of each place to all later ones, m, and the products of residuals."""
+    for i in range(len(place) - 1):
+        yield np.linalg.norm(place[i + 1 :] - place[i], axis=-1), residual[i + 1 :] * residual[i]
+
+
+def _rms(x: Real) -> float:
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def _sources(means: Sequence[Samples]) -> str:
+    return ", ".join(each.source for each in means)

@@ -1,0 +1,205 @@
+"""Levels of a link that were measured in flight, from a table of comma-separated values."""
+
+import csv
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.files import read_text
+from faao_mav.geodesy import LocalFrame
+from faao_mav.radio.fit import Samples
+
+_MOST_BYTES = 200_000_000
+"""Bytes of a table that are read at most; chosen: a day of ten rows a second."""
+
+_FARTHEST = 100_000.0
+"""Metres from the station beyond which positions are taken for mistaken. Chosen."""
+
+_WORDS = {
+    "time": ("time", "timestamp", "t", "seconds"),
+    "latitude": ("latitude", "lat"),
+    "longitude": ("longitude", "lon", "lng", "long"),
+    "altitude": ("altitude", "alt", "height"),
+    "rsrp": ("rsrp",),
+    "rssi": ("rssi", "power", "signal"),
+    "snr": ("snr", "sinr"),
+    "throughput": ("throughput", "rate", "goodput"),
+}
+"""What a table's header may call its columns, of which the last four are levels."""
+
+_LEVELS = ("rsrp", "rssi", "snr", "throughput")
+
+_DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0}
+_POWERS = {"dbm": 1.0, "sik": 1.0 / 1.9, "raw": 1.0}
+_UNITS: Mapping[str, Mapping[str, float]] = {
+    "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6},
+    "latitude": _DEGREES,
+    "longitude": _DEGREES,
+    "altitude": {"m": 1.0, "meters": 1.0, "metres": 1.0, "ft": 0.3048, "feet": 0.3048},
+    "rsrp": {"dbm": 1.0},
+    "rssi": _POWERS,
+    "snr": {"db": 1.0},
+    "throughput": dict.fromkeys(("mbit/s", "mbps", "mbit_per_s"), 1.0)
+    | dict.fromkeys(("kbit/s", "kbps", "kbit_per_s"), 1e-3)
+    | dict.fromkeys(("bit/s", "bps", "bit_per_s"), 1e-6),
+}
+"""The units of a column, in s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count: a level
+of (count/1.9 - 127) dBm (MAVLink, RADIO_STATUS); `raw` is any other device's count."""
+
+SIK_AT_ZERO = -127.0
+"""dBm that a SiK radio counts as 0 (MAVLink, RADIO_STATUS)."""
+
+_SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0), "sik": (-130.0, 10.0)}
+"""The least and the greatest level of a unit; beyond them it is another unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What was measured in a flight: `samples`, the `unit` of their levels, rows left out.
+
+    The unit is `dbm` of received power, `db` of signal to noise, `raw` of a device's own count, or
+    `mbit/s`.
+    """
+
+    samples: Samples
+    unit: str
+    left_out: int = 0
+
+
+def read_measured(
+    path: Path, station: tuple[float, float, float], units: Mapping[str, str] | None = None
+) -> Measured:
+    """Return the flight in the table `path`: time, latitude, longitude, altitude and one level.
+
+    Levels are rsrp, rssi, snr or throughput. `station` is latitude and longitude, degrees, and
+    height, m, of the antenna of the station, above what the altitudes are above. `units` are those
+    of columns whose header does not tell them. Rows without a number are left out. Raises
+    `InputError` for anything else.
+    """
+    text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
+    lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+    header = next(lines, "")
+    delimiter = max(";\t,", key=header.count)
+    names = next(csv.reader([header], delimiter=delimiter), [])
+    columns, unit_of = _columns(path, names, units or {})
+    try:
+        rows = _numbers(csv.reader(lines, delimiter=delimiter), columns, comma=delimiter == ";")
+    except csv.Error as error:
+        raise InputError(f"{path}: {error}; expected rows of numbers") from None
+    level = next(name for name in columns if name in _LEVELS)
+    scaled = {
+        name: values * _UNITS[name][unit_of[name]]
+        for name, values in zip(columns, rows.T, strict=True)
+    }
+    unit = unit_of[level]
+    if unit == "sik":
+        scaled[level] = scaled[level] + SIK_AT_ZERO
+    sound = np.isfinite(rows).all(axis=1)
+    kept = {name: values[sound] for name, values in scaled.items()}
+    if not sound.any():
+        raise InputError(f"{path}: no row with {', '.join(columns)}; expected the rows of a flight")
+    _check(path, kept[level], unit)
+    samples = samples_at(
+        path,
+        station,
+        kept["time"],
+        kept["latitude"],
+        kept["longitude"],
+        kept["altitude"],
+        kept[level],
+    )
+    told = "mbit/s" if level == "throughput" else "dbm" if unit == "sik" else unit
+    return Measured(samples, told, int(np.sum(~sound)))
+
+
+def samples_at(
+    path: Path,
+    station: tuple[float, float, float],
+    t: Real,
+    latitude: Real,
+    longitude: Real,
+    altitude: Real,
+    level: Real,
+) -> Samples:
+    """Return levels (k,) at places of the log `path` as `Samples`; see `read_measured`."""
+    if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
+        raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
+    local = LocalFrame(*station[:2]).to_local(latitude, longitude)
+    away = float(np.median(np.hypot(*local.T)))
+    if not away < _FARTHEST:
+        raise InputError(
+            f"{path}: {away / 1000:,.0f} km from --station {station[0]:g},{station[1]:g}; expected "
+            "a flight about it: are latitude and longitude exchanged?"
+        )
+    order = np.argsort(t, kind="stable")
+    place = np.column_stack([local, altitude - station[2]])
+    return Samples(t[order], place[order], level[order], path.name)
+
+
+def _columns(
+    path: Path, header: list[str], units: Mapping[str, str]
+) -> tuple[dict[str, int], dict[str, str]]:
+    """Return by quantity the number of its column in `header`, and its unit."""
+    columns, unit_of = dict[str, int](), dict[str, str]()
+    for number, told in enumerate(header):
+        words = re.findall(r"[^\s_()\[\],]+", told.lower())
+        name = next((n for n, known in _WORDS.items() if words and words[0] in known), None)
+        if name is None or name in columns:
+            continue
+        columns[name] = number
+        unit_of[name] = units.get(name, "_".join(words[1:])).lower()
+    missing = [
+        name for name in ("time", "latitude", "longitude", "altitude") if name not in columns
+    ]
+    levels = [name for name in columns if name in _LEVELS]
+    if missing or not levels:
+        missing += [] if levels else ["one of " + ", ".join(_LEVELS)]
+        raise InputError(f"{path}: line 1: no column of {', '.join(missing)} in {header}")
+    for name in levels[1:]:
+        del columns[name]
+    for name in columns:
+        known = _UNITS[name]
+        if unit_of[name] not in known and not (name == "time" and not unit_of[name]):
+            had = f"unit {unit_of[name]!r}" if unit_of[name] else "no unit"
+            raise InputError(
+                f"{path}: line 1: {header[columns[name]]!r} has {had}; name it in the header or "
+                f"give --unit {name}=UNIT, one of {', '.join(filter(None, known))}"
+            )
+        unit_of[name] = unit_of[name] or "s" if name == "time" else unit_of[name]
+    return columns, unit_of
+
+
+def _numbers(rows: Iterable[list[str]], columns: Mapping[str, int], *, comma: bool) -> Real:
+    """Return the numbers of those columns, (k, len(columns)), NaN for what is none."""
+
+    def number(row: list[str], name: str) -> float:
+        text = row[columns[name]].strip() if columns[name] < len(row) else ""
+        try:
+            return float(text.replace(",", ".") if comma else text)
+        except ValueError:
+            pass
+        try:
+            return datetime.fromisoformat(text).timestamp() if name == "time" else math.nan
+        except ValueError:
+            return math.nan
+
+    found = [[number(row, name) for name in columns] for row in rows]
+    return np.array(found, dtype=np.float64).reshape(-1, len(columns))
+
+
+def _check(path: Path, level: Real, unit: str) -> None:
+    """Raise `InputError` for levels that are none in `unit`."""
+    least, most = _SOUND.get(unit, (-math.inf, math.inf))
+    middle = float(np.median(level))
+    if not least <= middle <= most:
+        raise InputError(
+            f"{path}: levels about {middle:g} {unit}; expected {least:g} to {most:g}: is that the "
+            "unit?"
+        )

@@ -1,0 +1,142 @@
+"""The fit of a law to levels along flights: against laws that the tests draw fields about."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, Samples, fit_link
+
+
+def flight(height: float, seed: int = 0, rows: int = 6) -> Samples:
+    """A flight of `rows` legs of 400 m, 60 m apart, 8 m/s, read twice a second, of no level."""
+    ends = [(x, y) for k in range(rows) for x, y in [(-200, 60 * k), (200, 60 * k)][:: (-1) ** k]]
+    corners = np.array(ends, dtype=float) + np.array([17.0, -113.0 + seed])
+    away = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    t = np.arange(0.0, away[-1] / 8.0, 0.5)
+    east, north = (np.interp(8.0 * t, away, c) for c in corners.T)
+    return Samples(t, np.stack([east, north, np.full_like(t, height)], axis=1), np.zeros_like(t))
+
+
+def law(gain: tuple[float, ...], place: Real) -> Real:
+    """The law `gain` (level, exponent, c_1, ...), dB, at `place` (k, 3)."""
+    d = np.linalg.norm(place, axis=1)
+    terms = [c * (place[:, 2] / d) ** k for k, c in enumerate(gain[2:], 1)]
+    return np.asarray(gain[0] - 10 * gain[1] * np.log10(d) + sum(terms))
+
+
+def levels(
+    flights: list[Samples], gain: tuple[float, ...], spread: float, length: float, seed: int
+) -> list[Samples]:
+    """Levels of the law `gain` (level, exponent, c_1, ...) with shadowing and fast fading, dB."""
+    rng = np.random.default_rng(seed)
+    place = np.concatenate([each.place for each in flights])
+    apart = np.linalg.norm(place[:, None] - place[None], axis=2)
+    root = np.linalg.cholesky(np.exp(-apart / length) + 1e-9 * np.eye(len(place)))
+    fast = 10 * np.log10(np.mean(rng.exponential(size=(10, len(place))), axis=0))
+    level = law(gain, place) + spread * root @ rng.standard_normal(len(place)) + fast
+    cuts = np.cumsum([len(each.t) for each in flights])[:-1]
+    return [replace(f, level=x) for f, x in zip(flights, np.split(level, cuts), strict=True)]
+
+
+def off(fit: LinkFit, gain: tuple[float, ...]) -> float:
+    """The rms error of the fitted gain where it was flown, dB."""
+    place = np.concatenate([each.place for each in fit.flights])
+    return float(np.sqrt(np.mean((fit.gain_db(place) - law(gain, place)) ** 2)))
+
+
+LAWS = [(-40.0, 2.0), (-45.0, 2.7), (-50.0, 2.0, 30.0, -25.0), (-48.0, 2.0, 20.0)]
+
+
+@pytest.mark.parametrize("gain", LAWS)
+def test_a_law_is_found_within_its_stated_error(gain: tuple[float, ...]) -> None:
+    flights = [flight(height, seed) for seed, height in enumerate((40.0, 80.0, 120.0))]
+    for seed in range(3):
+        fit = fit_link(levels(flights, gain, 4.0, 30.0, seed))
+        assert fit.heights == 3
+        assert fit.legs >= 15
+        assert off(fit, gain) <= 3.0 * fit.error
+        assert fit.spread == pytest.approx(4.2, rel=0.25)
+        assert 10.0 < fit.correlation < 90.0
+        assert fit.holds
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    level=st.floats(-70, -20),
+    exponent=st.floats(1.6, 4.0),
+    terms=st.lists(st.floats(-15, 15), max_size=2),
+)
+def test_without_noise_the_law_itself_is_found(
+    level: float, exponent: float, terms: list[float]
+) -> None:
+    gain = (level, exponent, *terms)
+    flights = [flight(height, rows=3) for height in (40.0, 90.0)]
+    exact = [replace(f, level=law(gain, f.place)) for f in flights]
+    fit = fit_link(exact, seconds=0.5)
+    assert off(fit, gain) < 0.05
+
+
+def test_outliers_move_nothing() -> None:
+    gain = (-45.0, 2.0, 20.0)
+    clean = levels([flight(50.0), flight(100.0, 1)], gain, 3.0, 30.0, 1)
+    struck = []
+    for each in clean:
+        level = each.level.copy()
+        level[::40] += 60.0
+        struck.append(replace(each, level=level))
+    assert off(fit_link(struck), gain) < off(fit_link(clean), gain) + 1.0
+
+
+def test_what_is_not_finite_or_not_flown_is_left_out() -> None:
+    (sound,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
+    gaps = sound.level.copy()
+    gaps[5:20], gaps[40] = np.nan, np.inf
+    ground = np.vstack([sound.place, np.tile([5.0, 5.0, 0.5], (60, 1))])
+    t = np.concatenate([sound.t, sound.t[-1] + 1 + np.arange(60.0)])
+    fit = fit_link([Samples(t, ground, np.concatenate([gaps, np.full(60, -20.0)]))])
+    assert fit.count == pytest.approx(len(sound.t) / 4, abs=6)
+    assert off(fit, (-45.0, 2.0)) < 3.0
+
+
+def test_one_leg_gives_the_level_alone() -> None:
+    one = flight(50.0, rows=1)
+    fit = fit_link(levels([one], (-45.0, 2.0, 30.0, -20.0), 3.0, 30.0, 0))
+    assert fit.legs == 1
+    assert (fit.exponent, fit.elevation) == (2.0, ())
+    assert fit.error == np.inf
+
+
+def test_no_elevation_spread_gives_no_terms_that_run_wild() -> None:
+    """High above and far away the sine hardly changes: its terms would be anything elsewhere."""
+    far = flight(30.0)
+    far = replace(far, place=far.place + np.array([3000.0, 0.0, 0.0]))
+    for seed in range(3):
+        fit = fit_link(levels([far], (-45.0, 2.0), 3.0, 30.0, seed))
+        s = np.linspace(0.0, 1.0, 50)
+        swing = np.ptp(sum((c * s**k for k, c in enumerate(fit.elevation, 1)), 0.0 * s))
+        assert swing <= 40.0
+        assert off(fit, (-45.0, 2.0)) < 3.0
+
+
+def test_where_no_law_holds_it_is_said() -> None:
+    flights = [flight(height) for height in (40.0, 90.0)]
+    fit = fit_link(levels(flights, (-45.0, 2.0), 14.0, 40.0, 3))
+    assert fit.spread > SPREAD_OF_NO_LAW
+    assert not fit.holds
+
+
+@pytest.mark.parametrize("what", ["few", "still"])
+def test_no_flight_is_refused(what: str) -> None:
+    some = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)[0]
+    if what == "few":
+        some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
+        with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
+            fit_link([some])
+    else:
+        with pytest.raises(InputError, match="one place alone"):
+            fit_link([replace(some, place=0 * some.place + 40.0)])
