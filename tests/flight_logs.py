@@ -27,7 +27,7 @@ def heights(record: FlightRecord) -> Real:
 def kept(record: FlightRecord, which: Any) -> FlightRecord:
     """Return some of the positions of a flight."""
     columns = (record.t, record.latitude, record.longitude, record.altitude, record.home)
-    return FlightRecord.of(np.column_stack([*columns, record.wind])[which])
+    return FlightRecord.of(np.column_stack([*columns, record.wind, record.rssi])[which])
 
 
 def ulog(
@@ -45,6 +45,7 @@ def ulog(
         "vehicle_global_position": "uint64_t timestamp;double lat;double lon;float alt;",
         "home_position": "uint64_t timestamp;float alt;bool valid_alt;",
         "wind": "uint64_t timestamp;float windspeed_north;float windspeed_east;",
+        "radio_status": "uint64_t timestamp;uint8_t rssi;",
     }
     out = [b"ULog\x01\x12\x35\x01" + bytes(8), message(b"B", bytes(40))]
     out += [message(b"F", f"{name}:{fields}".encode()) for name, fields in formats.items()]
@@ -59,6 +60,8 @@ def ulog(
         if set_home != last:
             last = set_home
             out.append(message(b"D", struct.pack("<HQf?", 1, time, set_home, True)))
+        if math.isfinite(record.rssi[k]):
+            out.append(message(b"D", struct.pack("<HQB", 3, time - 1, int(record.rssi[k]))))
         out.append(message(b"D", struct.pack("<HQddf", 0, time, *place)))
         if wind is not None:
             out.append(message(b"D", struct.pack("<HQff", 2, time, *wind[k, ::-1])))
@@ -76,6 +79,7 @@ def dataflash(
         ("POS", "QLLff", "Qiiff", "Lat,Lng,Alt,RelHomeAlt"),
         ("XKF2", "QBff", "QBff", "C,VWN,VWE"),
         ("PARM", "QNf", "Q16sf", "Name,Value"),
+        ("RAD", "QB", "QB", "RSSI"),
     )
     out, layouts = [], {}
     for number, (name, letters, layout, columns) in enumerate(formats):
@@ -92,6 +96,8 @@ def dataflash(
         add("PARM", 0, name.encode(), value)
     for k, (t, latitude, longitude, altitude, its_home) in enumerate(_places(record)):
         place = round(latitude * 1e7), round(longitude * 1e7), altitude
+        if math.isfinite(record.rssi[k]):
+            add("RAD", round(t * 1e6), int(record.rssi[k]))
         add("POS", round(t * 1e6), *place, altitude - its_home)
         if wind is not None:
             add("XKF2", round(t * 1e6), 0, *wind[k, ::-1])
@@ -108,7 +114,7 @@ def heard(
     parameters: Mapping[str, float] = _NONE,
 ) -> list[tuple[float, bytes]]:
     """Return what `sender` says of a flight, and when it is heard, s: `delay` after its clock."""
-    link, out = dialect.MAVLink(None, *sender), []
+    link, radio, out = dialect.MAVLink(None, *sender), dialect.MAVLink(None, 51, 68), []
 
     def add(t: float, said: Any) -> None:
         out.append((t + delay, said.pack(link)))
@@ -118,6 +124,9 @@ def heard(
     for k, (t, latitude, longitude, altitude, its_home) in enumerate(_places(record)):
         place = round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
         height, ms = round((altitude - its_home) * 1e3), round(t * 1e3)
+        if math.isfinite(record.rssi[k]):
+            told = dialect.MAVLink_radio_status_message(int(record.rssi[k]), 9, 99, 9, 9, 0, 0)
+            out.append((t + delay, told.pack(radio)))
         add(t, dialect.MAVLink_global_position_int_message(ms, *place, height, 0, 0, 0, 0))
         if wind is not None:
             source = np.degrees(np.arctan2(*-wind[k]))

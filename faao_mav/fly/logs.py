@@ -36,6 +36,12 @@ _WINDS = {
 """Messages about parameters and wind, newer ones first, and their fields: towards east and north,
 but of WIND whence, degrees, and how fast."""
 
+_RADIOS = {"RADIO_STATUS": "rssi", "RADIO": "rssi", "RAD": "RSSI", "radio_status": "rssi"}
+"""Messages of telemetry radios, and the field with the level that they count."""
+
+_UNKNOWN = 255
+"""The level of a radio that does not know it (MAVLink, RADIO_STATUS)."""
+
 _LARGEST, _MOST_MESSAGES = 2**30, 1_000_000
 """Bytes of a log that is read, and messages about the flight that it has at most; chosen: hours of
 a `.bin`, and nine hours, thrice at 10 Hz."""
@@ -107,7 +113,11 @@ def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
         if count == _MOST_MESSAGES:
             text = f"more than {_MOST_MESSAGES:,} positions, winds and parameters"
             raise InputError(f"{path}: {text}; expected the log of a flight")
-        heard[number, component].hear(name, fields)
+        if name in _RADIOS and number:  # told by the radio itself, which has no place
+            for each in heard.values():
+                each.hear(name, fields)
+        else:
+            heard[number, component].hear(name, fields)
     flown = dict[int, _Heard]()
     for (number, _), each in sorted(heard.items(), key=itemgetter(0)):
         if len(each.fixes) >= _LEAST:
@@ -133,6 +143,7 @@ class _Heard:
         self.parameters: dict[str, float] = {}
         self._last, self._later, self._home = math.nan, 0.0, math.nan
         self._estimator, self._wind = len(_WINDS), (math.nan, math.nan)
+        self._rssi = math.nan
 
     def hear(self, name: str, said: Mapping[str, Any]) -> None:
         """Take note of a message."""
@@ -156,6 +167,8 @@ class _Heard:
                 key, field = _PARAMETERS[name]
                 if math.isfinite(value(field)):
                     self.parameters[str(said.get(key))] = value(field)
+            case _ if name in _RADIOS:
+                self._rssi = value(_RADIOS[name])
             case _ if name in _WINDS and not said.get("C", 0):  # the first of the estimators
                 self._blow(name, *map(value, _WINDS[name]))
 
@@ -177,7 +190,9 @@ class _Heard:
         self._last = t
         if abs(height) <= _BOUNDS[-1]:
             self._home = altitude - height
-        self.fixes.append(Fix(t + self._later, *place, self._home, *self._wind))
+        rssi = math.nan if self._rssi == _UNKNOWN else self._rssi
+        self.fixes.append(Fix(t + self._later, *place, self._home, *self._wind, rssi))
+        self._rssi = math.nan
 
     def _blow(self, name: str, east: float, north: float) -> None:
         """Take note of a wind, if no better estimator tells one; one that does not run tells 0."""
@@ -213,7 +228,9 @@ def _mavlog(path: Path, *, own: bool) -> Iterator[Said]:
     except AttributeError:  # a log that ends in the first message of its kind
         log = mavutil.mavlogfile(str(path))  # which takes ten times as long
     with closing(log):
-        while (message := log.recv_match(type=[*_PLACES, *_PARAMETERS, *_WINDS])) is not None:
+        while (
+            message := log.recv_match(type=[*_PLACES, *_PARAMETERS, *_WINDS, *_RADIOS])
+        ) is not None:
             sender = (0, 0) if own else (message.get_srcSystem(), message.get_srcComponent())
             yield *sender, message.get_type(), message.to_dict()
 
@@ -222,7 +239,7 @@ def _ulog(path: Path) -> Iterator[Said]:
     from pyulog import ULog
 
     with path.open("rb") as file:
-        log = ULog(file, [*_PLACES, *_WINDS])
+        log = ULog(file, [*_PLACES, *_WINDS, *_RADIOS])
     for name, value in log.initial_parameters.items():
         yield 0, 0, "PARM", {"Name": name, "Value": value}
     rows: list[tuple[float, str, dict[str, float]]] = []

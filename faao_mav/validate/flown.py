@@ -70,7 +70,10 @@ class Line(NamedTuple):
 
 
 class Fix(NamedTuple):
-    """A position: s on the vehicle's clock, degrees, m above the sea, and m/s of wind."""
+    """A position: s on the vehicle's clock, degrees, m above the sea, and m/s of wind.
+
+    `rssi` is what its telemetry radio counted there, NaN where it did not.
+    """
 
     t: float
     latitude: float
@@ -79,6 +82,7 @@ class Fix(NamedTuple):
     home: float
     east: float = math.nan
     north: float = math.nan
+    rssi: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,8 +92,9 @@ class FlightRecord:
     `t` (k,), s, is the vehicle's clock, which increases; `latitude` and `longitude` (k,) are
     degrees; `altitude` and `home` (k,) are how high it and its home were above the sea, m: home may
     be set again. `wind` (k, 2) is the wind as it was estimated, m/s towards east and north, NaN
-    where that is not known. `parameters` are those that a log names. `system` is the number by
-    which it told that over MAVLink.
+    where that is not known. `rssi` (k,) is the level that its telemetry radio counted, NaN where it
+    told none. `parameters` are those that a log names. `system` is the number by which it told that
+    over MAVLink.
     """
 
     t: Real
@@ -98,6 +103,7 @@ class FlightRecord:
     altitude: Real
     home: Real
     wind: Real
+    rssi: Real
     parameters: Mapping[str, float] = field(default_factory=dict)
     system: int | None = None
 
@@ -106,9 +112,11 @@ class FlightRecord:
         cls, fixes: ArrayLike, parameters: Mapping[str, float] | None = None, system: int = 0
     ) -> "FlightRecord":
         """Return the record of positions, each a `Fix`."""
-        t, latitude, longitude, altitude, home, *wind = np.reshape(fixes, (-1, len(Fix._fields))).T
+        columns = np.reshape(fixes, (-1, len(Fix._fields))).T
+        t, latitude, longitude, altitude, home, east, north, rssi = columns
         place = latitude, longitude, altitude, home
-        return cls(t, *place, np.stack(wind, axis=1), parameters or {}, system or None)
+        wind = np.stack([east, north], axis=1)
+        return cls(t, *place, wind, rssi, parameters or {}, system or None)
 
     def mean_wind(self, start: float, duration: float) -> Real | None:
         """Return the mean (2,) of the wind in that time, None where nothing was estimated."""

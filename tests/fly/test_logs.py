@@ -137,6 +137,9 @@ def test_every_kind_of_log_tells_the_flight(
     wind[1::7] = np.inf
     wind[2::7, 0] = -1e30
     parameters = {"SPEED": 6.0, "BROKEN": float("nan")}
+    rssi = np.where(np.arange(len(flight.t)) % 4 == 1, 150.0, np.nan)
+    rssi[5] = 255.0  # not known
+    flight = replace(flight, rssi=rssi)
     written = {
         "bin": dataflash(flight, wind=wind, parameters=parameters),
         "tlog": tlog(heard(flight, wind=wind, parameters=parameters)),
@@ -150,6 +153,7 @@ def test_every_kind_of_log_tells_the_flight(
         assert getattr(record, name) == pytest.approx(getattr(flight, name), abs=1e-7)
     assert heights(record) == pytest.approx(heights(flight), abs=2e-3)
     assert record.parameters == {"SPEED": 6.0}
+    np.testing.assert_array_equal(record.rssi, np.where(rssi == 150.0, rssi, np.nan))
     assert record.mean_wind(record.t[0], 1e3) == pytest.approx([2.0, 1.0])
 
 

@@ -100,7 +100,7 @@ def test_what_became_of_it_is_priced_as_a_prediction_is() -> None:
     flight, origin = flown(solution, 200.0, pause=12.0), solution.plan.origin
     place = LocalFrame(origin.latitude, origin.longitude).to_geodetic(flight.w)
     home = np.where(flight.t < 190.0, 500.0, 510.0)  # set again before the departure
-    record = FlightRecord(flight.t, *place, 510.0 + flight.up, home, np.zeros((len(home), 2)))
+    record = FlightRecord(flight.t, *place, 510.0 + flight.up, home, np.zeros((len(home), 2)), home)
     for start in (None, 200.0):
         found = debriefing(solution, Line.planned(solution), record, start)
         assert found is not None
