@@ -4,8 +4,8 @@ Read in the autopilots' sources and measured on ArduCopter 4.7 and PX4 1.16 in s
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -18,16 +18,64 @@ from faao_mav.mission.command import (
     POLYGON,
     RALLY_POINT,
     Command,
+    Frame,
 )
 from faao_mav.mission.item import MissionItem
 
 Codec: TypeAlias = Callable[[float], float]
-"""What is read back for a parameter that was sent."""
+"""What is read back for a number that was sent."""
 
 Codecs: TypeAlias = tuple[Codec, Codec, Codec, Codec]
 """Those of param1 to param4."""
 
 SpeedAxis: TypeAlias = Literal["horizontal", "climb", "descent", "airspeed", "least ground speed"]
+
+
+def dropped(_: float) -> float:
+    """Not stored: reads back as 0."""
+    return 0.0
+
+
+def single(value: float) -> float:
+    """Stored as it came over the wire, in single precision."""
+    return float(np.float32(value))
+
+
+def whole(least: int, most: int) -> Codec:
+    """Stored as a whole number: fractions are cut off, what is out of range ends at its limit."""
+
+    def codec(value: float) -> float:
+        return 0.0 if math.isnan(value) else float(math.trunc(min(max(value, least), most)))
+
+    return codec
+
+
+def flag(value: float) -> float:
+    """Stored as a bit: 1 above 0."""
+    return 1.0 if value > 0 else 0.0
+
+
+def first(codec: Codec) -> Codecs:
+    """Return how param1 alone is stored."""
+    return (codec, dropped, dropped, dropped)
+
+
+NOTHING: Codecs = (dropped, dropped, dropped, dropped)
+"""None of the four parameters is stored."""
+
+ALL: Codecs = (single, single, single, single)
+"""All four are."""
+
+UNKNOWN: Codecs = (float, float, float, float)
+"""It is not known what is stored: everything, as far as is told."""
+
+BESIDE: dict[int, Codecs] = (
+    dict.fromkeys(POLYGON.values(), first(whole(0, 65_535)))
+    | dict.fromkeys(CIRCLE.values(), first(single))
+    | dict.fromkeys((FENCE_RETURN_POINT, RALLY_POINT), NOTHING)
+)
+"""What every autopilot measured keeps of the parameters of fence and rally rows: how many vertices
+a polygon has, and the radius of a circle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +94,12 @@ class SpeedChange:
     speed: float | None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Dialect:
     """How one autopilot takes missions.
 
     Attributes:
+        name: what takes them, as messages say it.
         home_row: item 0 on the wire is home, which the vehicle replaces by its own.
         items: how many items fit, the home row included.
         jumps: how many DO_JUMPs keep count of their repeats; None: all.
@@ -59,20 +108,24 @@ class Dialect:
         atomic: a refused upload leaves the old mission as it was.
         unset_is_zero: it refuses most parameters that are not set (NaN), and is sent 0 instead.
         zero_means_here: latitude and longitude 0, 0 stand for the place where the vehicle is.
-        placed_in_mission_frame: items in frame 2 (MISSION) have a place too, above sea level.
-        refusal: why an item is refused on upload, None if it is taken.
-        stored: what reading back an accepted row gives, of the mission, the fence or the rally
-            points. Numbers went over the wire: parameters and altitude are of single precision,
-            degrees multiples of 1e-7. What the autopilot has no room for is gone.
+        placed, unplaced: the commands that it takes with a place and without one, with what is
+            stored of their parameters; what has no place is stored at 0, 0, 0 unless it
+            `keeps_idle` numbers.
+        frames, idle_frames: the frames in which it takes those and these, and in which it gives
+            them back.
+        may_be_unset: where NaN is refused, the parameters, from 0, of commands that may be NaN.
+        altitude, fence_altitude, rally_altitude: what is stored of the altitude of an item, of a
+            row of the fence and of a rally point.
+        highest: the altitude, m, from which on items are refused; None: none is.
+        always_continues: it stores no autocontinue, which reads back as true.
         speed_change: what a DO_CHANGE_SPEED changes, None for one that changes nothing.
         unlimited: whether the vehicle's parameters make room for any number of items, and
             `make_room` how to set them so.
         endings: the commands behind which nothing is flown.
         flies_on: whether, by the vehicle's parameters, a take-off behind a landing is flown.
-        known: the commands of which it is known what is stored, None: all. Of the others `stored`
-            takes everything to be kept.
     """
 
+    name: str
     home_row: bool
     items: Limit
     jumps: Limit | None
@@ -81,15 +134,27 @@ class Dialect:
     atomic: bool
     unset_is_zero: bool
     zero_means_here: bool
-    placed_in_mission_frame: bool
-    refusal: Callable[[MissionItem], str | None]
-    stored: Callable[[MissionItem], MissionItem]
+    placed: Mapping[int, Codecs]
+    unplaced: Mapping[int, Codecs]
+    frames: Mapping[int, int]
+    idle_frames: Mapping[int, int]
     speed_change: Callable[[MissionItem], SpeedChange | None]
+    may_be_unset: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    altitude: Codec = single
+    fence_altitude: Codec = single
+    rally_altitude: Codec = single
+    highest: float | None = None
+    always_continues: bool = False
+    keeps_idle: bool = True
     unlimited: Callable[[ParameterValues], bool] = lambda _: False
     make_room: str = ""
     endings: frozenset[int] = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
     flies_on: Callable[[ParameterValues], bool] = lambda _: False
-    known: frozenset[int] | None = None
+
+    @property
+    def placed_in_mission_frame(self) -> bool:
+        """Whether items in frame 2 (MISSION) may have a place too, above sea level."""
+        return Frame.MISSION in self.frames
 
     def sent(self, item: MissionItem) -> MissionItem:
         """Return `item` as it is sent: what is not set as 0 where NaN is refused.
@@ -98,73 +163,68 @@ class Dialect:
         """
         if not self.unset_is_zero:
             return item
-        one, two, three, four, up = (
-            0.0 if math.isnan(value) else value for value in (*item.params, item.z)
-        )
-        up = item.z if item.command in FLOWN_TO else up
-        return replace(item, params=(one, two, three, four), z=up)
+        up = item.z if item.command in FLOWN_TO or not math.isnan(item.z) else 0.0
+        return replace(item, params=_each((_set,) * 4, item), z=up)
+
+    def refusal(self, item: MissionItem) -> str | None:
+        """Return why `item` is refused on upload, None if it is taken."""
+        kind, command = item.command, name_of(item.command)
+        if kind not in self.placed and kind not in self.unplaced:
+            return f"{self.name} does not support {command} in missions"
+        for index, value in enumerate(item.params if self.unset_is_zero else ()):
+            if math.isnan(value) and index not in self.may_be_unset.get(kind, ()):
+                return f"{self.name} takes no NaN in param{index + 1} of {command}; give 0"
+        placed = self.frames if kind in self.placed else {}
+        idle = self.idle_frames if kind in self.unplaced else {}
+        if item.frame not in placed:
+            give = ", ".join(str(int(frame)) for frame in sorted({*placed, *idle}))
+            refused = f"{self.name} takes no {command} in frame {item.frame}; give one of {give}"
+            return None if item.frame in idle else refused
+        for name, value, limit in (("latitude", item.x, 90), ("longitude", item.y, 180)):
+            if not abs(value) <= limit:
+                return f"{self.name} takes no {name} {value:g}; give degrees within {limit}"
+        if self.highest is not None and not abs(item.z) < self.highest:
+            return f"{self.name} takes no altitude {item.z:g}; give metres below {self.highest:g}"
+        return None
+
+    def stored(self, item: MissionItem) -> MissionItem:
+        """Return what reading back gives for a row of the mission, the fence or the rally points.
+
+        Numbers went over the wire: parameters and altitude are of single precision, degrees
+        multiples of 1e-7. What the autopilot has no room for is gone.
+        """
+        rally, (x, y) = item.command == RALLY_POINT, map(degrees, (item.x, item.y))
+        if item.command in BESIDE:
+            params, frame = _each(BESIDE[item.command], item), self.frames[0]
+            frame = self.frames.get(item.frame, frame) if rally else frame
+            up = (self.rally_altitude if rally else self.fence_altitude)(item.z)
+            goes_on = item.autocontinue and rally and not self.always_continues
+            return MissionItem(item.command, frame, params, x, y, up, autocontinue=goes_on)
+        item = replace(item, autocontinue=item.autocontinue or self.always_continues)
+        if item.command in self.placed and item.frame in self.frames:
+            params, frame = _each(self.placed[item.command], item), self.frames[item.frame]
+            return replace(item, params=params, frame=frame, x=x, y=y, z=self.altitude(item.z))
+        params = _each(self.unplaced.get(item.command, UNKNOWN), item)
+        frame, x, y, z = self.idle_frames.get(item.frame, item.frame), 0.0, 0.0, 0.0
+        if self.keeps_idle:
+            x, y, z = float(round(_set(item.x))), float(round(_set(item.y))), single(item.z)
+        return replace(item, params=params, frame=frame, x=x, y=y, z=z)
 
     def is_known(self, command: int) -> bool:
         """Tell whether it is known what the autopilot keeps of `command`."""
-        return self.known is None or command in self.known
+        known = self.placed.get(command, self.unplaced.get(command, UNKNOWN))
+        return known is not UNKNOWN
 
 
-def dropped(_: float) -> float:
-    """Not stored: reads back as 0."""
-    return 0.0
+def _set(value: float) -> float:
+    """Return `value`, 0 for what is not set."""
+    return 0.0 if math.isnan(value) else value
 
 
-NOTHING: Codecs = (dropped, dropped, dropped, dropped)
-"""None of the four parameters is stored."""
-
-
-def first(codec: Codec) -> Codecs:
-    """Return how param1 alone is stored."""
-    return (codec, dropped, dropped, dropped)
-
-
-def through(codecs: Codecs, item: MissionItem) -> MissionItem:
-    """Return `item` with what `codecs` leave of its parameters."""
-    param1, param2, param3, param4 = (
-        codec(value) for codec, value in zip(codecs, item.params, strict=True)
-    )
-    return replace(item, params=(param1, param2, param3, param4))
-
-
-def misplaced(item: MissionItem) -> tuple[str, float, int] | None:
-    """Return name, value and limit of the coordinate of `item` that is not on Earth, if any."""
-    for name, value, limit in (("latitude", item.x, 90), ("longitude", item.y, 180)):
-        if not abs(value) <= limit:
-            return name, value, limit
-    return None
-
-
-def single(value: float) -> float:
-    """Stored as it came over the wire, in single precision."""
-    return float(np.float32(value))
-
-
-def whole(least: int, most: int) -> Codec:
-    """Stored as a whole number: fractions are cut off, what is out of range ends at its limit."""
-
-    def codec(value: float) -> float:
-        return 0.0 if math.isnan(value) else float(math.trunc(min(max(value, least), most)))
-
-    return codec
-
-
-BESIDE: dict[int, Codecs] = (
-    dict.fromkeys(POLYGON.values(), first(whole(0, 65_535)))
-    | dict.fromkeys(CIRCLE.values(), first(single))
-    | dict.fromkeys((FENCE_RETURN_POINT, RALLY_POINT), NOTHING)
-)
-"""What every autopilot measured keeps of the parameters of fence and rally rows: how many vertices
-a polygon has, and the radius of a circle."""
-
-
-def flag(value: float) -> float:
-    """Stored as a bit: 1 above 0."""
-    return 1.0 if value > 0 else 0.0
+def _each(codecs: Codecs, item: MissionItem) -> tuple[float, float, float, float]:
+    """Return what `codecs` leave of the parameters of `item`."""
+    one, two, three, four = (f(value) for f, value in zip(codecs, item.params, strict=True))
+    return one, two, three, four
 
 
 def degrees(value: float) -> float:

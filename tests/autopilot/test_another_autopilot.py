@@ -20,7 +20,7 @@ from faao_mav.autopilot import (
     unregister,
     vehicle_type_by_numbers,
 )
-from faao_mav.autopilot.dialect import Dialect, Limit, SpeedChange
+from faao_mav.autopilot.dialect import ALL, Dialect, Limit, SpeedChange
 from faao_mav.autopilot.files import autopilot_of, parameter_path
 from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
@@ -97,6 +97,7 @@ COPTER = VehicleType(
     hovers=True,
     parameters=TABLE,
     dialect=Dialect(
+        name="ToyCopter",
         home_row=False,
         items=Limit(500, 500),
         jumps=None,
@@ -105,9 +106,10 @@ COPTER = VehicleType(
         atomic=True,
         unset_is_zero=False,
         zero_means_here=False,
-        placed_in_mission_frame=False,
-        refusal=lambda item: "no splines" if item.command == Command.NAV_SPLINE_WAYPOINT else None,
-        stored=lambda item: replace(item, autocontinue=True),
+        placed=dict.fromkeys((Command.NAV_WAYPOINT, Command.NAV_TAKEOFF, Command.NAV_LAND), ALL),
+        unplaced=dict.fromkeys((Command.NAV_RETURN_TO_LAUNCH, Command.DO_CHANGE_SPEED), ALL),
+        frames={3: 3, 6: 3},
+        idle_frames={2: 2},
         speed_change=lambda item: SpeedChange("horizontal", item.params[1]),
     ),
     vertical=lambda vehicle: VerticalProfile(
