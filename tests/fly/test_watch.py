@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flight_logs import heights
 from mock_flights import fly
 from scenes import AnotherStation, Scene, arms, starts
 from simulate import Station
@@ -33,8 +34,8 @@ def test_armed_started_and_watched_to_the_end(kind: str, loss: float) -> None:
     assert list(dict.fromkeys(scene.commands)) == [ARM, START]
     record, track = scene.watch.seen.record(), fly(a_mission(12))
     assert (np.diff(record.t) > 0).all()
-    assert record.height.max() == pytest.approx(track.position[:, 2].max(), abs=0.5)
-    assert record.height[-1] < 5
+    assert heights(record).max() == pytest.approx(track.position[:, 2].max(), abs=0.5)
+    assert heights(record)[-1] < 5
     if not loss:
         assert np.diff(record.t).max() == pytest.approx(0.2, abs=0.06)
 
@@ -274,7 +275,7 @@ def test_a_mission_outlives_the_terminal(kind: str) -> None:
         modes.append(mock.mode)
     assert not mock.armed
     assert {AUTO[kind]} <= set(modes) <= {AUTO[kind], 4 << 16 | 5 << 24}  # PX4's return
-    assert scene.watch.seen.record().height.max() > 20
+    assert heights(scene.watch.seen.record()).max() > 20
 
 
 @KINDS
