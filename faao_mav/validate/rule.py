@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
@@ -71,17 +72,19 @@ class Rule:
         return Finding(self.level, self.id, None if index is None else index + 1, says, do)
 
 
-def read_rules(constants: Mapping[str, object]) -> Iterator[Rule]:
-    """Yield the rules of the table beside this module, in which "-" is nothing.
+def rows_of(table: Traversable) -> Iterator[list[str]]:
+    """Yield the rows under the head of a `table` with tabs, in which "-" is nothing."""
+    for line in table.read_text(encoding="utf-8").splitlines()[1:]:
+        yield ["" if each == "-" else each for each in line.split("\t")]
 
-    A summary may name `constants` in braces.
-    """
-    table = files("faao_mav.validate").joinpath("rules.tsv").read_text(encoding="utf-8")
-    for row in table.splitlines()[1:]:
-        level, name, *rest = row.split("\t")
-        autopilot, kind, summary, says, do, source = ("" if each == "-" else each for each in rest)
-        summary = summary.format_map(constants)
-        yield Rule(Level(level), name, autopilot or None, kind or None, summary, says, do, source)
+
+def read_rules(constants: Mapping[str, object]) -> Iterator[Rule]:
+    """Yield the rules of the table beside this module; a summary may name `constants` in braces."""
+    for level, name, autopilot, kind, summary, says, do, source in rows_of(
+        files("faao_mav.validate").joinpath("rules.tsv")
+    ):
+        about = autopilot or None, kind or None, summary.format_map(constants)
+        yield Rule(Level(level), name, *about, says, do, source)
 
 
 Hit: TypeAlias = tuple[str, int | None, dict[str, object]]
