@@ -87,6 +87,11 @@ class ArduPlane(ArduPlaneLimits):
         return flight.samples.flown(np.array(arrivals), np.array(arrivals), step)
 
 
+def _angle(vector: complex) -> float:
+    """Return the angle of `vector`, rad; cmath.phase raises where it is below all floats."""
+    return math.atan2(vector.imag, vector.real)
+
+
 class _Flight:
     """A flight, its samples kept.
 
@@ -123,7 +128,7 @@ class _Flight:
             east, north, self._climb = path.entry.tolist()
             airspeed = complex(east, north) - self._wind
             self._demand = plane.true_airspeed(0.0, altitude)
-        self._airspeed, self._heading = max(abs(airspeed), _SLOWEST), cmath.phase(airspeed)
+        self._airspeed, self._heading = max(abs(airspeed), _SLOWEST), _angle(airspeed)
         self.time, self.samples = 0.0, Samples(path.longest)
         self._keep()
 
@@ -133,7 +138,7 @@ class _Flight:
         turn = 1.0  # over 90 degrees
         if k + 1 < len(self._places):
             onward = self._places[k + 1] - self._places[k]
-            turn = min(abs(cmath.phase(before.conjugate() * onward)) / (math.pi / 2), 1.0)
+            turn = min(abs(_angle(before.conjugate() * onward)) / (math.pi / 2), 1.0)
         while (away := self._away(k, _unit(before), turn)) > 0:
             self.move(k, min(STEP, max(away / abs(self._velocity), _SHORTEST)))
         self.move(k, _NOTICED)
@@ -176,7 +181,7 @@ class _Flight:
         climb = min(max(climb, -plane.descent_speed), plane.climb_speed)
         self._climb += (climb - self._climb) * -math.expm1(-step / _CLIMB_LAG)
         self._height += self._climb * step
-        turn = cmath.phase(aim * velocity.conjugate())
+        turn = _angle(aim * velocity.conjugate())
         turn = min(max(turn, -math.pi / 2), math.pi / 2)
         gain = 4 * plane.damping**2 / plane.look_ahead
         bank = math.atan2(gain * abs(velocity) * math.sin(turn), GRAVITY)
