@@ -61,7 +61,7 @@ def mission_of(name: str) -> str:
 def wind_of(name: str) -> Wind:
     """Return the wind of the flight `name`."""
     speed, _, degrees = name.partition("-wind")[2].partition("from")
-    return Wind(float(speed or 0), float(degrees or 0))
+    return Wind(speed=float(speed or 0), from_degrees=float(degrees or 0))
 
 
 def read(folder: Path, name: str, *, home_row: bool) -> Recorded:

@@ -1,11 +1,10 @@
 """What the plan says of power and battery: `vehicle.power` and `vehicle.battery`."""
 
-from dataclasses import dataclass
 from typing import Annotated
 
 from pydantic import BeforeValidator
 
-from faao_mav.plan.fields import Number, Section, key
+from faao_mav.plan.fields import Number, key, section
 from faao_mav.power import GRAVITY, FixedWing, PowerModel, RotaryWing
 
 _COPTER_MASS, _PLANE_MASS = 20 / GRAVITY, 10.0
@@ -18,34 +17,32 @@ def _percent(value: object) -> object:
     return float(number) if number.replace(".", "", 1).isdecimal() else value
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PowerOptions(Section):
+@section
+class PowerOptions:
     """The power that flight takes: from measured power, or from what the aircraft is.
 
     The defaults are those of the aircraft of the papers.
     """
 
-    hover_w: Annotated[
-        Number | None, key("Copter: power in hover; with cruise_w and at.", "W", gt=0, le=1e6)
-    ] = None
-    cruise_w: Annotated[
-        Number | None,
-        key("Power at the airspeed `at`; of a plane at that of longest range.", "W", gt=0, le=1e6),
-    ] = None
-    at: Annotated[Number | None, key("Airspeed of cruise_w.", "m/s", gt=0, le=1000)] = None
-    mass: Annotated[
-        Number | None,
-        key("Mass; null: 2.039 kg for copters, 10 kg for planes.", "kg", gt=0, le=1e5),
-    ] = None
-    rotor_area: Annotated[Number, key("Copter: area of all rotor discs.", "m^2", gt=0, le=1e4)] = (
-        0.503
+    hover_w: Number | None = key(
+        "Copter: power in hover; with cruise_w and at.", "(0, 1e6] W", default=None
     )
-    solidity: Annotated[Number, key("Copter: area of blades by that of discs.", gt=0, le=1)] = 0.05
-    tip_speed: Annotated[Number, key("Copter: speed of blade tips.", "m/s", gt=0, le=400)] = 120.0
-    drag_ratio: Annotated[Number, key("Copter: fuselage drag ratio d_0.", ge=0, le=1000)] = 0.6
-    air_density: Annotated[Number, key("Copter: density of the air.", "kg/m^3", gt=0, le=2)] = 1.225
-    c1: Annotated[Number, key("Plane: factor of v^3.", "W s^3/m^3", gt=0, le=1e6)] = 9.26e-4
-    c2: Annotated[Number, key("Plane: factor of 1 / v.", "W m/s", gt=0, le=1e9)] = 2250.0
+    cruise_w: Number | None = key(
+        "Power at the airspeed `at`; of a plane at that of longest range.",
+        "(0, 1e6] W",
+        default=None,
+    )
+    at: Number | None = key("Airspeed of cruise_w.", "(0, 1000] m/s", default=None)
+    mass: Number | None = key(
+        "Mass; null: 2.039 kg for copters, 10 kg for planes.", "(0, 100000] kg", default=None
+    )
+    rotor_area: Number = key("Copter: area of all rotor discs.", "(0, 10000] m^2", default=0.503)
+    solidity: Number = key("Copter: area of blades by that of discs.", "(0, 1]", default=0.05)
+    tip_speed: Number = key("Copter: speed of blade tips.", "(0, 400] m/s", default=120.0)
+    drag_ratio: Number = key("Copter: fuselage drag ratio d_0.", "[0, 1000]", default=0.6)
+    air_density: Number = key("Copter: density of the air.", "(0, 2] kg/m^3", default=1.225)
+    c1: Number = key("Plane: factor of v^3.", "(0, 1e6] W s^3/m^3", default=9.26e-4)
+    c2: Number = key("Plane: factor of 1 / v.", "(0, 1e9] W m/s", default=2250.0)
 
     def model(self, *, hovers: bool) -> PowerModel:
         """Return the power of an aircraft that `hovers`, or of a plane."""
@@ -67,16 +64,17 @@ class PowerOptions(Section):
         return model.fitted(self.hover_w, self.cruise_w, self.at)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Battery(Section):
+@section
+class Battery:
     """The battery that the whole mission is held against (needs `vehicle.power`)."""
 
-    capacity_wh: Annotated[Number, key("Energy of the full battery.", "Wh", gt=0, le=1e6)]
-    reserve: Annotated[
-        Number,
-        BeforeValidator(_percent),
-        key("Share that has to be left after landing.", "%", "a percentage, 0 to 99", ge=0, le=99),
-    ] = 20.0
+    capacity_wh: Number = key("Energy of the full battery.", "(0, 1e6] Wh")
+    reserve: Annotated[Number, BeforeValidator(_percent)] = key(
+        "Share that has to be left after landing.",
+        "[0, 99] %",
+        "a percentage, 0 to 99",
+        default=20.0,
+    )
 
     @property
     def usable(self) -> float:

@@ -1,27 +1,31 @@
-"""How a key of `plan.yaml` is declared, read and checked: the types that `model` is made of.
+"""How a section of `plan.yaml` is declared, and the types that its keys are read as.
 
-People write decibels and degrees; the plan holds watts, linear gains and local metres. A key is
-declared where its value is held, in the annotation of a dataclass's field: the type, what the key
-means, its unit, its limits.
+A section is a class, a key a field of it: its type, what it means, which numbers it may have in
+which unit, its default.
 
-    duration: Annotated[Number, key("Duration T.", "s", gt=0, le=1e7)]
+    @section
+    class Flight:
+        duration: Number = key("Duration T.", "(0, 1e7] s")
 
-What is accepted follows from type and limits (`keys.reference`) unless it is said in words.
+People write decibels and degrees; the plan holds watts, linear gains and local metres. What is
+accepted follows from the type and the interval (`keys.reference`) unless it is said in words.
 """
 
+import json
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from dataclasses import MISSING, dataclass, field
+from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from pydantic import (
     AfterValidator,
     AllowInfNan,
-    ConfigDict,
     Field,
     PlainValidator,
     Strict,
     ValidationInfo,
+    with_config,
 )
 from pydantic_core import PydanticCustomError
 
@@ -34,16 +38,46 @@ MAX_LOCAL_DISTANCE = 100_000.0
 MIN_DBM = -200.0
 """Least transmit power, dBm; chosen: no link carries anything there."""
 
+_INTERVAL = re.compile(r"([\[(])(\S+), (\S+)\] ?(.*)")
+"""An interval, which has its upper end, and a unit: `(0, 1000] m/s`."""
+
+_Section = TypeVar("_Section")
+
+
+def key(
+    description: str,
+    values: str = "",
+    accepted: str = "",
+    *,
+    name: str | None = None,
+    default: Any = MISSING,
+    default_factory: Any = MISSING,
+    **limits: Any,
+) -> Any:
+    """Declare a key: what it means, its interval and unit, and in words what is accepted.
+
+    `values` is `[0, 50] m/s`, with `(` where the lower end is not in it, or the unit alone. `name`
+    is the key's name in the file, if another than the field's; `limits` are more of pydantic's, as
+    `min_length`.
+    """
+    if found := _INTERVAL.fullmatch(values):
+        begins, low, high, values = found.groups()
+        limits |= {"gt" if begins == "(" else "ge": json.loads(low), "le": json.loads(high)}
+    said = {"description": description, "alias": name} | limits
+    said["json_schema_extra"] = {"unit": values, "accepted": accepted}
+    return field(default=default, default_factory=default_factory, metadata=said)
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(key, field))
+def section(cls: type[_Section]) -> type[_Section]:
+    """Make a class of keys a frozen dataclass that is read from a mapping of these keys alone."""
+    made = dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    return with_config(extra="forbid")(made)
+
+
 Number: TypeAlias = Annotated[float, Strict(), AllowInfNan(False)]
 Whole: TypeAlias = Annotated[int, Strict()]
 Flag: TypeAlias = Annotated[bool, Strict()]
-
-
-class Section:
-    """A mapping of known keys."""
-
-    __slots__ = ()
-    __pydantic_config__ = ConfigDict(extra="forbid")
 
 
 def _one_line(text: str) -> str:
@@ -81,18 +115,6 @@ def one_of(names: Callable[[], tuple[str, ...]]) -> PlainValidator:
         return value
 
     return PlainValidator(check)
-
-
-def key(
-    description: str, unit: str = "", accepted: str = "", *, name: str | None = None, **limits: Any
-) -> Any:
-    """Declare a key: what it means, its unit, what is accepted where type and limits do not tell.
-
-    `name` is its name in the file, if another than the field's; `limits` are pydantic's: `ge`,
-    `gt`, `le`, `lt`, `min_length`, `max_length`.
-    """
-    extra: dict[str, Any] = {"unit": unit, "accepted": accepted}
-    return Field(description=description, alias=name, json_schema_extra=extra, **limits)
 
 
 def watts(dbm: float) -> float:

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
@@ -63,20 +63,22 @@ def _reference(names: tuple[Autopilot, ...], kinds: tuple[Kind, ...]) -> Mapping
 
 def _below(section: type, prefix: str) -> Iterator[PlanKey]:
     for field in fields(section):
-        info = FieldInfo.from_annotation(field.type)  # type: ignore[arg-type]
+        of: Any = field.type
+        info = FieldInfo.from_annotated_attribute(of, field)
         written = next((m for m in info.metadata if isinstance(m, Written)), Written(""))
         in_file = written.accepted if isinstance(written.accepted, str) else written.accepted()
         inner = list(_sections(info.annotation))
         inside = tuple(key.path for one in inner for key in _below(one, "") if "." not in key.path)
         extra: Any = info.json_schema_extra or {"unit": "", "accepted": ""}
-        required = field.default is MISSING and field.default_factory is MISSING
-        default = field.default if field.default_factory is MISSING else field.default_factory()
+        required = info.is_required()
         path = prefix + (info.alias or field.name)
         yield PlanKey(
             path,
             info.description or inner[0].__doc__.partition("\n")[0],
             extra["unit"],
-            "" if required or inside else _as_yaml(written.convert(default)),
+            ""
+            if required or inside
+            else _as_yaml(written.convert(info.get_default(call_default_factory=True))),
             required,
             extra["accepted"] or in_file or _accepted(info, extra["unit"], inside),
             inside,
@@ -106,14 +108,15 @@ def _choices(annotation: Any) -> tuple[str, ...]:
 
 def _as_yaml(value: object) -> str:
     """Return a default as a plan's file would have it; nothing for None."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_as_yaml, value))}]"
-    if isinstance(value, int | float):
-        return f"{value:g}".replace("e+0", "e")
-    if isinstance(value, Mapping):
-        return "{}"
+    match value:
+        case bool():
+            return str(value).lower()
+        case tuple():
+            return f"[{', '.join(map(_as_yaml, value))}]"
+        case int() | float():
+            return f"{value:g}".replace("e+0", "e")
+        case Mapping():
+            return "{}"
     return "" if value is None else str(value) or '""'
 
 
@@ -122,12 +125,10 @@ def _accepted(info: FieldInfo, unit: str, inside: tuple[str, ...]) -> str:
     kind: Any = info.annotation
     if inside:
         return f"a mapping with {', '.join(inside)}"
-    if get_origin(kind) is Literal:
-        return listed(get_args(kind))
+    if choices := _choices(kind):
+        return listed(choices)
     if get_origin(kind) is tuple:
-        return f"a list of {listed(get_args(get_args(kind)[0]), 'and')}"
-    if kind is bool:
-        return "true or false"
+        return f"a list of {listed(_choices(get_args(kind)[0]), 'and')}"
     number = "a whole number" if kind is int else "a number"
     of = f" of {_UNIT_WORDS.get(unit, unit)}" if unit else ""
     limits = {n: getattr(m, n) for m in info.metadata for n in ("gt", "ge", "le") if hasattr(m, n)}

@@ -8,7 +8,6 @@ lists them all.
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Annotated
 
 from faao_mav.autopilot import Vehicle, VehicleType, vehicle_type
 from faao_mav.autopilot.body import Body
@@ -16,9 +15,9 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
 from faao_mav.plan.fields import (
-    Section,
     Text,
     key,
+    section,
 )
 from faao_mav.plan.radio import Radio
 from faao_mav.plan.sections import (
@@ -36,19 +35,17 @@ from faao_mav.power import PowerModel
 from faao_mav.vector import Vector
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanFile(Section):
+@section
+class PlanFile:
     """What the file of a plan holds."""
 
-    name: Annotated[
-        Text,
-        key(
-            "Name, for the summary.",
-            "",
-            "one line of at most 200 printable characters",
-            max_length=200,
-        ),
-    ] = ""
+    name: Text = key(
+        "Name, for the summary.",
+        "",
+        "one line of at most 200 printable characters",
+        max_length=200,
+        default="",
+    )
     site: Site
     vehicle: VehicleOptions
     flight: Flight

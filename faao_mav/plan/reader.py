@@ -1,7 +1,7 @@
 """`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, fields
 from functools import cache
 from itertools import islice
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.errors import InputError, PlanError, place_of, quote
@@ -166,16 +167,19 @@ def _adapter() -> TypeAdapter[PlanFile]:
 
 def _describe(error: ValidationError, source: str) -> str:
     """Return one line per finding (at most `_MAX_LINES`), each naming `source`."""
-    lines = list(dict.fromkeys(islice(_lines(error), _MAX_LINES)))
-    more = error.error_count() - _MAX_LINES
-    if more > 0:
-        lines.append(f"and {more} more")
+    details = error.errors(include_url=False)
+    inside = {d["loc"][:k] for d in details for k in range(len(d["loc"]))}
+    # of a list whose items are wrong pydantic also says that it is too short
+    own = [d for d in details if d["type"] != "too_short" or d["loc"] not in inside]
+    lines = list(dict.fromkeys(islice(_lines(own), _MAX_LINES)))
+    if len(own) > _MAX_LINES:
+        lines.append(f"and {len(own) - _MAX_LINES} more")
     return "\n".join(f"{source}: {line}" for line in lines)
 
 
-def _lines(error: ValidationError) -> Iterator[str]:
+def _lines(details: Sequence[ErrorDetails]) -> Iterator[str]:
     known = reference()
-    for detail in error.errors(include_url=False):
+    for detail in details:
         value, kind, loc = detail["input"], detail["type"], detail["loc"]
         own = loc[-1:] if kind == "unexpected_keyword_argument" else ()  # may be any text
         steps = [step for step in loc[: len(loc) - len(own)] if step not in CHOICES] + [*own]

@@ -1,6 +1,5 @@
 """What the plan says of where the aircraft may be: `fence`."""
 
-from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
@@ -9,28 +8,26 @@ from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Number,
     Position,
-    Section,
     Text,
     key,
+    section,
 )
 from faao_mav.vector import Vector
 
 
-@dataclass(frozen=True, slots=True)
-class CircleZone(Section):
+@section
+class CircleZone:
     """A circle of the fence."""
 
-    center: Annotated[Position, key("Centre of the circle.", "m")]
-    radius: Annotated[Number, key("Radius of the circle.", "m", gt=0, le=MAX_LOCAL_DISTANCE)]
+    center: Position = key("Centre of the circle.", "m")
+    radius: Number = key("Radius of the circle.", "m", gt=0, le=MAX_LOCAL_DISTANCE)
 
 
-@dataclass(frozen=True, slots=True)
-class PolygonZone(Section):
+@section
+class PolygonZone:
     """A polygon of the fence."""
 
-    polygon: Annotated[
-        tuple[Position, ...], key("Corners.", "m", "three corners or more", min_length=3)
-    ]
+    polygon: tuple[Position, ...] = key("Corners.", "m", "three corners or more", min_length=3)
 
 
 CHOICES = ("<circle>", "<polygon>", "<corners>", "<zones>")
@@ -49,7 +46,7 @@ def _corners_or_zones(value: object) -> str:
 
 
 def _one_polygon(corners: tuple[Vector, ...]) -> tuple[PolygonZone, ...]:
-    return (PolygonZone(corners),) if corners else ()
+    return (PolygonZone(polygon=corners),) if corners else ()
 
 
 Zone: TypeAlias = Annotated[
@@ -62,30 +59,27 @@ _OnePolygon: TypeAlias = Annotated[
 ]
 
 
-@dataclass(frozen=True, slots=True)
-class FenceOptions(Section):
+@section
+class FenceOptions:
     """Where the aircraft may be: it stays inside the inclusions and out of the exclusions."""
 
     inclusion: Annotated[
         Annotated[_OnePolygon, Tag("<corners>")] | Annotated[Zones, Tag("<zones>")],
         Discriminator(_corners_or_zones),
-        key(
-            "Area to stay in; of several zones PX4 asks for any, ArduPilot for all.",
-            "m",
-            "three corners or more, or a list of {center, radius} and {polygon}",
-        ),
-    ] = ()
-    exclusion: Annotated[
-        Zones,
-        key("Zones to stay out of.", accepted="a list of {center, radius} and {polygon}"),
-    ] = ()
-    file: Annotated[
-        Text | None,
-        key(
-            "File with more zones, beside the plan's file or by its whole path.",
-            accepted="the name of a .plan, .kml or .geojson file",
-        ),
-    ] = None
-    margin: Annotated[
-        Number, key("Distance from the edge that the planned path keeps.", "m", ge=0, le=10_000)
-    ] = 5.0
+    ] = key(
+        "Area to stay in; of several zones PX4 asks for any, ArduPilot for all.",
+        "m",
+        "three corners or more, or a list of {center, radius} and {polygon}",
+        default=(),
+    )
+    exclusion: Zones = key(
+        "Zones to stay out of.", accepted="a list of {center, radius} and {polygon}", default=()
+    )
+    file: Text | None = key(
+        "File with more zones, beside the plan's file or by its whole path.",
+        accepted="the name of a .plan, .kml or .geojson file",
+        default=None,
+    )
+    margin: Number = key(
+        "Distance from the edge that the planned path keeps.", "[0, 10000] m", default=5.0
+    )

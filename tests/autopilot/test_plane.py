@@ -55,7 +55,7 @@ def test_the_demanded_airspeed_falls_as_total_energy_control_lets_it() -> None:
 @given(speed=st.floats(0, 8), degrees=st.floats(0, 360))
 def test_a_wind_shifts_the_velocity_and_the_track_is_kept(speed: float, degrees: float) -> None:
     """The airspeed V leads along the track at sqrt(V^2 - across^2) + along."""
-    wind = Wind(speed, degrees).velocity
+    wind = Wind(speed=speed, from_degrees=degrees).velocity
     flown = PLANE.fly(replace(line(500, 2, 15.0), wind=wind))
     np.testing.assert_allclose(flown.position[:, 1], 0, atol=0.05)
     ground = math.sqrt(15**2 - wind[1] ** 2) + wind[0]

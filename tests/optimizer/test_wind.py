@@ -36,7 +36,9 @@ COPTER = Kinematics(
     max_airspeed=9.0,
 )
 FREE = replace(COPTER, start_velocity=None, end_velocity=None)
-winds = st.tuples(st.floats(0, 8.9), st.floats(0, 360)).map(lambda each: Wind(*each).velocity)
+winds = st.builds(Wind, speed=st.floats(0, 8.9), from_degrees=st.floats(0, 360)).map(
+    lambda wind: wind.velocity
+)
 
 
 @settings(max_examples=40, deadline=None)

@@ -27,14 +27,16 @@ def there_and_back(speed: float) -> Mission:
 
 
 def test_a_flight_that_the_wind_carries_away_ends() -> None:
-    carried = check(there_and_back(8), COPTER, wind=Wind(14, 0).velocity)
+    carried = check(there_and_back(8), COPTER, wind=Wind(speed=14, from_degrees=0).velocity)
     assert carried.track is None
     assert "perhaps for the wind" in carried.unpredicted
 
 
 def test_a_wind_across_is_held_without_a_trace() -> None:
     mission = there_and_back(6)
-    calm, windy = (predict(mission, COPTER, wind=Wind(each, 90).velocity) for each in (0, 6))
+    calm, windy = (
+        predict(mission, COPTER, wind=Wind(speed=each, from_degrees=90).velocity) for each in (0, 6)
+    )
     assert abs(windy.t[-1] - calm.t[-1]) < 0.5
     assert np.abs(windy.position[:, 0]).max() < 0.5
 
