@@ -13,7 +13,7 @@ import numpy as np
 
 from faao_mav.app.answers import thinned
 from faao_mav.errors import FaaoError, PlanError
-from faao_mav.report.lines import joined
+from faao_mav.report.summary import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle
 from faao_mav.workflow import Result
 

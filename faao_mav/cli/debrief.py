@@ -47,7 +47,7 @@ def debrief(
     from faao_mav.fly.logs import read_log
     from faao_mav.fly.radio import Radios
     from faao_mav.report.debrief import FromLog
-    from faao_mav.report.lines import joined
+    from faao_mav.report.summary import joined
     from faao_mav.workflow import Result, with_mission
 
     records = read_log(log, system)

@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from faao_mav.report.flights import check_lines
+from faao_mav.report.summary import check_lines
 from faao_mav.validate import Level, Rule
 from faao_mav.validate.check import Check
 from faao_mav.validate.words import by_rule, count_of, said_of

@@ -80,7 +80,7 @@ def fly(
     from faao_mav.fly.telemetry import POSITION_RATE
     from faao_mav.fly.telling import HEADER, Telling, as_text
     from faao_mav.report.debrief import flight_lines
-    from faao_mav.report.lines import joined
+    from faao_mav.report.summary import joined
 
     begun = False
 

@@ -8,8 +8,7 @@ from typing import Any
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
-from faao_mav.report.flights import debriefing_lines
-from faao_mav.report.lines import Line
+from faao_mav.report.summary import Line, beside
 from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
 from faao_mav.workflow import Result, debriefing_as_dict
@@ -25,6 +24,19 @@ def flight_lines(report: FlightReport, found: Debriefing | None) -> Iterator[Lin
         yield from debriefing_lines(found)
     if report.ending is not None:
         yield report.ending.kind, report.ending.text
+
+
+def debriefing_lines(found: Debriefing) -> Iterator[Line]:
+    """Yield what became of a plan, hop by hop: planned, predicted and flown."""
+    for name, flight in (("predicted", found.predicted), ("flown", found.flown)):
+        yield from zip((name, "", "", ""), beside(found.solution, flight), strict=True)
+    yield "height", f"at most {found.altitude_error:.1f} m from the planned one"
+    if found.missing > 0:
+        yield (
+            "incomplete",
+            f"of the plan's last {found.missing:.1f} s there is no flight: counted as if the "
+            "aircraft had stayed where it was seen last",
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,8 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from faao_mav.report.debrief import FromLog
-from faao_mav.report.flights import check_lines
-from faao_mav.report.lines import Line
 from faao_mav.report.style import inline_svg
-from faao_mav.report.summary import result_lines
+from faao_mav.report.summary import Line, check_lines, result_lines
 from faao_mav.validate import Finding
 from faao_mav.validate.check import Check
 from faao_mav.validate.flown import Debriefing

@@ -1,15 +1,46 @@
-"""A result in words: the text that the main job prints."""
+"""A planned flight, and a mission that was checked, in words: for the terminal and both pages."""
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
-from faao_mav.report.flights import brief_flight, conditions, flight_lines
-from faao_mav.report.found import brief_link, found_lines, remarkable
-from faao_mav.report.lines import Line, joined
+import numpy as np
+
+from faao_mav.optimizer.kinematics import kinematics
+from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
+from faao_mav.plan.fields import dbm
 from faao_mav.schedule.precoder_table import taken_by
+from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Level
-from faao_mav.validate.words import by_rule, count_of, line_of
+from faao_mav.validate.check import Check
+from faao_mav.validate.words import by_rule, count_of, counted, line_of
+from faao_mav.vector import lengths
 from faao_mav.workflow import Result
+
+_AT_LIMIT = 0.999
+"""The share of a limit at which it counts as reached. Chosen."""
+
+_LOSS_TOLD = 0.01
+"""Share of R_avg that may be lost on the way before a plan for R_avg is warned about. Chosen."""
+
+_MOST_ZONES = 12
+"""Zones of a fence that are named; chosen to fit a few lines."""
+
+_LABEL_WIDTH = 13
+"""Characters that a label takes on the terminal."""
+
+Line: TypeAlias = tuple[str, str]
+"""A label and a text; a line without a label goes on where the one before it ended."""
+
+_RESEARCH = ("delivered", "information", "new fading", "starts", "optimiser", "predicted")
+"""Labels of what is told with --verbose alone, with the lines that go on from them."""
+
+
+def joined(lines: Iterable[Line]) -> str:
+    """Return `lines` as the terminal shows them."""
+    return "\n".join(f"{label:<{_LABEL_WIDTH}}{text}" for label, text in lines)
 
 
 def summary(
@@ -25,12 +56,111 @@ def summary(
     whether anything is wrong. `verbose` adds what a researcher looks at. Of a `precoder_table`
     among the files it says which rows a late aircraft takes.
     """
-    lines = list(result_lines(result) if verbose else _brief(result))
+    lines: list[Line] = []
+    hidden = () if verbose else _RESEARCH
+    topic = ""
+    for label, text in result_lines(result):
+        topic = label or topic
+        if topic not in hidden or (topic == "optimiser" and not result.solution.converged):
+            lines.append((label, text))
     lines += _checked(result)
     rows = f" (a late aircraft takes the row of the {taken_by(result.solution.plan)})"
     names = ", ".join(f"{path}{rows if path == precoder_table else ''}" for path in written)
     lines.append(("files", names or "none: give --out MISSION.waypoints"))
     return "\n".join([_headline(result), joined(lines)])
+
+
+def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
+    """Yield what the optimiser found and how its mission will fly.
+
+    With `timed` it says how long that took, which no two runs have in common.
+    """
+    solution, plan, fresh = result.solution, result.solution.plan, result.fresh
+    rates, delivered, radio = solution.rates, solution.delivered_rate, plan.radio
+    yield from _goal(solution)
+    limit = result.saturation
+    most = f", at most {limit.ceiling:.5g} by the alphabet" if limit else ""
+    measure = "" if plan.optimizer.rate == "cutoff" else " of mutual information"
+    hops = f"base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f}"
+    yield "rate", f"{_told_rate(rates.R_avg, radio.bandwidth_mhz)}{most}{measure} ({hops})"
+    half, share = radio.duplex == "half", delivered / rates.R_avg if rates.R_avg else 1.0
+    if not radio.causal and share < 1 - _LOSS_TOLD:
+        why = "both hops share the time, and " if half else ""
+        told = f"warning: {100 * (1 - share):.2g} % of R_avg does not arrive: {why}the relay "
+        told += "forwards only what it has received; radio.causal: true plans for what arrives"
+        yield "", told
+    told = _told_rate(delivered, radio.bandwidth_mhz) + _megabytes(plan.megabytes(delivered))
+    shared = "in half duplex " if half else ""
+    yield "delivered", f"{told}; {shared}{100 * share:.2f} % of R_avg"
+    if (information := result.information) is not None:
+        told = f"mutual information {information.average:.3f} +- {information.error:.1g}"
+        yield "information", f"{told}, {information.delivered:.3f} delivered"
+    if solution.gain is not None:
+        error = information.error if information else 0.0
+        told = f"{solution.gain:.4f} bit/s/Hz more than by the plan for the cutoff rate"
+        doubt = f", below the error of averages over the noise, {error:.1g}"
+        yield "", told + doubt * (solution.gain <= error)
+    if fresh:
+        told = f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} bit/s/Hz delivered, R_avg "
+        told += f"{fresh.average:.4f} +- {fresh.error:.1g}, on draws that were not planned on"
+        yield "new fading", told
+    if result.bound is not None:
+        reached, value = delivered if radio.causal else rates.R_avg, result.bound.value
+        short = 100 * (1 - reached / value) if value else 0.0
+        most = f"at most {_told_rate(value, radio.bandwidth_mhz)} (estimate)"
+        yield "bound", f"within {short:.2g} % of the best that any route can do: {most}"
+    if limit is not None and limit.saturated:
+        told = "the alphabet is used up and the route hardly matters: "
+        yield "saturated", f"{told}{limit.spare_db:.1f} dB less power at both stations would do"
+    if len(solution.starts) > 1:
+        ranked = sorted(solution.starts.items(), key=lambda start: start[1])
+        (worst, low), (best, high) = ranked[0], ranked[-1]
+        told = f"{len(ranked)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
+        yield "starts", told
+    told = "converged" if solution.converged else "NOT CONVERGED"
+    told += f" after {counted(solution.iterations, 'iteration')}"
+    told += f", which took {result.seconds_optimize:.1f} s" if timed else ""
+    yield "optimiser", f"{told}: {solution.ending}"
+    yield "", f"{solution.history[0]:.4f} bit/s/Hz on the straight start"
+    yield from _limits(solution)
+    yield from _mission(result)
+    yield from _wind(plan)
+    yield from _energy(result.check)
+    yield from _fenced(result)
+
+
+def check_lines(check: Check) -> Iterator[Line]:
+    """Yield what the predicted flight of a mission is, by itself and beside its plan."""
+    if check.track is None:
+        yield "flight not predicted", check.unpredicted
+    else:
+        lasting = f"{check.track.t[-1]:.0f} s"
+        if any(check.wind):
+            lasting = f"{lasting} in {math.hypot(*check.wind):.3g} m/s of wind"
+            if not check.vehicle.type.models_wind:
+                lasting += ", as in calm air: its model leaves wind out"
+        yield "predicted flight", f"{lasting}; {check.vehicle.assumption}"
+    yield from _energy(check)
+    if link := check.link:
+        bandwidth = link.bandwidth_mhz
+        delivered = _of_plan(link.predicted_delivered, link.planned_delivered, bandwidth)
+        delivered += _megabytes(link.predicted_mbytes)
+        average = _of_plan(link.predicted_rate, link.planned_rate, bandwidth)
+        yield "predicted link", f"delivers {delivered}; R_avg {average}"
+        yield "", _apart(link.rms_position_error, link.max_position_error, link.path_error)
+
+
+def beside(solution: Solution, flight: Prediction) -> Iterator[str]:
+    """Yield what a flight delivers, what its hops carry and how far it is from the plan."""
+    plan, planned, rates = solution.plan, solution.rates, flight.rates
+    bandwidth = plan.radio.bandwidth_mhz
+    delivers = _of_plan(flight.delivered_rate, solution.delivered_rate, bandwidth)
+    delivers += _megabytes(plan.megabytes(flight.delivered_rate))
+    late = round(flight.duration - plan.flight.duration, 1) + 0.0  # no minus before 0.0
+    yield f"delivers {delivers}, in {flight.duration:.1f} s ({late:+.1f} s)"
+    yield f"base station to UAV {_of_plan(rates.R_U, planned.R_U, bandwidth)}"
+    yield f"UAV to user {_of_plan(rates.R_G, planned.R_G, bandwidth)}"
+    yield _apart(flight.rms_position_error, flight.max_position_error, flight.max_path_error)
 
 
 def _headline(result: Result) -> str:
@@ -60,22 +190,6 @@ def _wrong(result: Result) -> str:
     return ", ".join(counts) or "no errors or warnings"
 
 
-def _brief(result: Result) -> Iterator[Line]:
-    yield from brief_link(result)
-    yield from remarkable(result)
-    yield from brief_flight(result)
-    yield from conditions(result)
-
-
-def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
-    """Yield what the optimiser found and how its mission will fly.
-
-    With `timed` it says how long that took, which no two runs have in common.
-    """
-    yield from found_lines(result, timed=timed)
-    yield from flight_lines(result)
-
-
 def _checked(result: Result) -> Iterator[Line]:
     """Yield what validation found, notes counted and the rest told, and the parameters to load."""
     if result.conversion is None:
@@ -87,3 +201,140 @@ def _checked(result: Result) -> Iterator[Line]:
     if parameters := result.conversion.parameters:
         wanted = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
         yield "parameters", f"the mission is timed for {wanted}: load them first"
+
+
+def _mission(result: Result) -> Iterator[Line]:
+    conversion, flown, solution = result.conversion, result.prediction, result.solution
+    if result.no_mission is not None:
+        yield "mission", f"none: {result.no_mission}"
+    if conversion is None or flown is None:
+        return
+    *carried, near = beside(solution, flown)
+    items = counted(len(conversion.mission.items), "item")
+    way = f"{conversion.schedule.route.distance:.0f} m in {flown.duration:.1f} s"
+    yield "mission", f"{items}; relay route of {way}"
+    yield "", f"predicted {near}"
+    yield "", conversion.vehicle.assumption
+    yield from zip(("predicted", "", ""), carried, strict=True)
+
+
+def _goal(solution: Solution) -> Iterator[Line]:
+    """Yield what a goal led to, and for a least quantity what one step less would deliver."""
+    found, plan = solution.least, solution.plan
+    if found is None:
+        return
+    flights = f"{found.optimizations} flights optimised"
+    if plan.goal.energy_wh is not None:
+        told = f"most data within {plan.goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
+        told += f"({found.limit:g} s given), {solution.energy_wh:.4g} Wh; {flights}"
+        yield "goal", told
+        return
+    of = plan.goal.minimise or ""
+    limit = {
+        "duration": f"{found.limit:g} s given",
+        "power": f"{found.limit:g} dBm given",
+        "energy": f"{found.limit:.4g} Wh without that goal",
+    }[of]
+    told = f"least {of} for {_asked(plan, plan.needed_rate)}: {_minimised(solution)} ({limit})"
+    yield "goal", f"{told}; {flights}"
+    if (below := found.below) is None:
+        yield "", f"no flight takes less {'energy' if of == 'energy' else 'time'}"
+    else:
+        delivered = _asked(below.plan, below.delivered_rate)
+        yield "", f"{_minimised(below)} would deliver {delivered}"
+
+
+def _minimised(solution: Solution) -> str:
+    """Return how much of what its plan's goal minimises a solution has."""
+    plan = solution.plan
+    if plan.goal.minimise == "duration":
+        return f"{plan.flight.duration:g} s"
+    if plan.goal.minimise == "energy":
+        return f"{solution.energy_wh:.4g} Wh in {plan.flight.duration:g} s"
+    powers = dict.fromkeys(f"{dbm(power):.2f}" for power in plan.powers)
+    return f"{' and '.join(powers)} dBm"
+
+
+def _asked(plan: Plan, rate: float) -> str:
+    """Return what `rate`, bit/s/Hz, delivers in the unit of the plan's goal."""
+    megabytes = plan.megabytes(rate) if plan.goal.deliver_mbytes is not None else None
+    return f"{rate:.4f} bit/s/Hz" if megabytes is None else f"{megabytes:.5g} megabytes"
+
+
+def _limits(solution: Solution) -> Iterator[Line]:
+    """Yield how fast turns and the airspeed change at most, where that binds the plan."""
+    kin = kinematics(solution.plan)
+    if kin.turn_binds:
+        turned = lengths(solution.a)[:-1] > _AT_LIMIT * kin.turn_limits(solution.v)
+        if turned.any():
+            told = f"by at most {math.degrees(kin.most_turn):.3g} degrees per second over ground, "
+            told += "as the vehicle's guidance follows, which binds the plan for "
+            yield "turns", f"{told}{kin.time_step * turned.sum():.3g} s"
+    speed = lengths(solution.v - kin.wind)
+    change, square = np.diff(speed) / kin.time_step, np.diff(speed**2) / (2 * kin.time_step)
+    bound = (change < -_AT_LIMIT * kin.most_fall) | (square > _AT_LIMIT * kin.most_power)
+    if bound.any():
+        told = f"falls by at most {kin.most_fall:.2g} m/s^2 and rises by at most "
+        told += f"{kin.most_power / kin.max_speed:.2g}, as the vehicle's does, which binds the "
+        yield "airspeed", f"{told}plan for {kin.time_step * bound.sum():.3g} s"
+
+
+def _wind(plan: Plan) -> Iterator[Line]:
+    """Yield the plan's wind, if it has one."""
+    wind, told = plan.site.wind, []
+    if any(plan.wind):
+        told.append(f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees")
+    if wind.gust > wind.speed:
+        told.append(f"gusts of {wind.gust:g} m/s")
+    if told:
+        yield "wind", "; ".join(told)
+
+
+def _energy(check: Check | None) -> Iterator[Line]:
+    """Yield what the whole predicted flight takes, and what of the battery it leaves."""
+    energy = check.energy if check is not None else None
+    if energy is None:
+        return
+    told = f"{energy.total:.4g} Wh for the whole flight"
+    if not energy.lands:
+        told += " as far as the mission goes, in the air at its end"
+    if energy.battery is not None and energy.left is not None:
+        battery = energy.battery
+        left = f"{100 * energy.left:.0f} %" if energy.left > 0 else "nothing"
+        told += f"; {left} of {battery.capacity_wh:g} Wh is left (reserve {battery.reserve:g} %)"
+    yield "energy", told
+
+
+def _fenced(result: Result) -> Iterator[Line]:
+    if (fence := result.fence) is None:
+        return
+    kept = f"the plan keeps {fence.planned_clearance:.1f} m (margin {fence.margin:g} m)"
+    if fence.predicted_clearance is not None:
+        kept += f", the predicted flight {fence.predicted_clearance:.1f} m"
+    more = f" and {fence.areas - _MOST_ZONES} more" if fence.areas > _MOST_ZONES else ""
+    yield "fence", f"{', '.join(fence.zones[:_MOST_ZONES])}{more}"
+    yield from (("", note) for note in fence.notes)
+    yield "", f"{kept} from the edge"
+
+
+def _told_rate(rate: float, bandwidth_mhz: float | None) -> str:
+    """Return `rate`, bit/s/Hz, as text, with a bandwidth in Mbit/s too."""
+    megabits = "" if bandwidth_mhz is None else f" ({rate * bandwidth_mhz:.4g} Mbit/s)"
+    return f"{rate:.4f} bit/s/Hz{megabits}"
+
+
+def _of_plan(rate: float, planned: float, bandwidth_mhz: float | None) -> str:
+    """Return `rate` as text, and its share of the `planned` one."""
+    share = 100 * rate / planned if planned else 100.0
+    return f"{_told_rate(rate, bandwidth_mhz)}, {share:.2f} % of the plan"
+
+
+def _megabytes(amount: float | None) -> str:
+    """Return what is delivered as the end of a sentence, nothing where no bandwidth is given."""
+    return "" if amount is None else f", {amount:.4g} megabytes"
+
+
+def _apart(rms: float, most: float, path: float) -> str:
+    """Say how far, m, a flight is from the plan."""
+    at_equal_times = f"{rms:.1f} m rms from the plan at equal times, {most:.1f} m at most"
+    return f"{at_equal_times}; {path:.1f} m from its path"
