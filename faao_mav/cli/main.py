@@ -19,6 +19,7 @@ from faao_mav.cli.convert import convert
 from faao_mav.cli.debrief import debrief
 from faao_mav.cli.download import download
 from faao_mav.cli.fly import fly
+from faao_mav.cli.link import link
 from faao_mav.cli.plan import plan
 from faao_mav.cli.shared import note
 from faao_mav.cli.study import study
@@ -68,7 +69,19 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (plan, validate, upload, download, fly, debrief, convert, autopilot, study, page):
+for command in (
+    plan,
+    validate,
+    upload,
+    download,
+    fly,
+    debrief,
+    link,
+    convert,
+    autopilot,
+    study,
+    page,
+):
     app.command(command.__name__)(command)
 
 

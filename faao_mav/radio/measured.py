@@ -1,12 +1,14 @@
-"""Levels of a link that were measured in flight, from a table of comma-separated values."""
+"""Levels of a link that were measured in flight: their units, and tables of them (CSV)."""
 
 import csv
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from types import MappingProxyType
+from typing import TypeAlias
 
 import numpy as np
 
@@ -36,27 +38,31 @@ _WORDS = {
 
 _LEVELS = ("rsrp", "rssi", "snr", "throughput")
 
+_NONE: Mapping[str, str] = MappingProxyType({})
+
 _DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0}
-_POWERS = {"dbm": 1.0, "sik": 1.0 / 1.9, "raw": 1.0}
 _UNITS: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6},
     "latitude": _DEGREES,
     "longitude": _DEGREES,
     "altitude": {"m": 1.0, "meters": 1.0, "metres": 1.0, "ft": 0.3048, "feet": 0.3048},
     "rsrp": {"dbm": 1.0},
-    "rssi": _POWERS,
+    "rssi": {"dbm": 1.0, "sik": 1.0, "raw": 1.0},
     "snr": {"db": 1.0},
     "throughput": dict.fromkeys(("mbit/s", "mbps", "mbit_per_s"), 1.0)
     | dict.fromkeys(("kbit/s", "kbps", "kbit_per_s"), 1e-3)
     | dict.fromkeys(("bit/s", "bps", "bit_per_s"), 1e-6),
 }
-"""The units of a column, in s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count: a level
-of (count/1.9 - 127) dBm (MAVLink, RADIO_STATUS); `raw` is any other device's count."""
+"""The units of a column, in s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count, `raw` is
+any other device's count."""
 
-SIK_AT_ZERO = -127.0
-"""dBm that a SiK radio counts as 0 (MAVLink, RADIO_STATUS)."""
+_SIK = 1.0 / 1.9, -127.0
+"""dB a count of a SiK radio, and dBm that it counts as 0 (SiK firmware, "RSSI values")."""
 
-_SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0), "sik": (-130.0, 10.0)}
+Calibration: TypeAlias = Sequence[Sequence[float]]
+"""Counts of a device, and the dBm that they are: one or two."""
+
+_SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0)}
 """The least and the greatest level of a unit; beyond them it is another unit."""
 
 
@@ -64,8 +70,7 @@ _SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0), "sik": (-130.0, 10.0)}
 class Measured:
     """What was measured in a flight: `samples`, the `unit` of their levels, rows left out.
 
-    The unit is `dbm` of received power, `db` of signal to noise, `raw` of a device's own count, or
-    `mbit/s`.
+    The unit is `dbm` of received power, `db` of signal to noise, or `mbit/s`.
     """
 
     samples: Samples
@@ -74,21 +79,24 @@ class Measured:
 
 
 def read_measured(
-    path: Path, station: tuple[float, float, float], units: Mapping[str, str] | None = None
+    path: Path,
+    station: Sequence[float],
+    units: Mapping[str, str] = _NONE,
+    calibration: Calibration = (),
 ) -> Measured:
     """Return the flight in the table `path`: time, latitude, longitude, altitude and one level.
 
     Levels are rsrp, rssi, snr or throughput. `station` is latitude and longitude, degrees, and
     height, m, of the antenna of the station, above what the altitudes are above. `units` are those
-    of columns whose header does not tell them. Rows without a number are left out. Raises
-    `InputError` for anything else.
+    of columns whose header does not tell them; `calibration` is a device's. Rows without a number
+    are left out. Raises `InputError` for anything else.
     """
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     header = next(lines, "")
     delimiter = max(";\t,", key=header.count)
     names = next(csv.reader([header], delimiter=delimiter), [])
-    columns, unit_of = _columns(path, names, units or {})
+    columns, unit_of = _columns(path, names, units)
     try:
         rows = _numbers(csv.reader(lines, delimiter=delimiter), columns, comma=delimiter == ";")
     except csv.Error as error:
@@ -99,13 +107,11 @@ def read_measured(
         for name, values in zip(columns, rows.T, strict=True)
     }
     unit = unit_of[level]
-    if unit == "sik":
-        scaled[level] = scaled[level] + SIK_AT_ZERO
     sound = np.isfinite(rows).all(axis=1)
     kept = {name: values[sound] for name, values in scaled.items()}
     if not sound.any():
         raise InputError(f"{path}: no row with {', '.join(columns)}; expected the rows of a flight")
-    _check(path, kept[level], unit)
+    kept[level], unit = level_of(path, kept[level], unit, calibration)
     samples = samples_at(
         path,
         station,
@@ -115,13 +121,39 @@ def read_measured(
         kept["altitude"],
         kept[level],
     )
-    told = "mbit/s" if level == "throughput" else "dbm" if unit == "sik" else unit
-    return Measured(samples, told, int(np.sum(~sound)))
+    return Measured(samples, unit, int(np.sum(~sound)))
+
+
+def level_of(path: Path, told: Real, unit: str, calibration: Calibration = ()) -> tuple[Real, str]:
+    """Return levels `told` (k,) in `unit` as those of a `Measured`, and their unit.
+
+    Counts are linear in dBm through the points of the `calibration`; with one point, or none, they
+    have the steps, or all, of SiK radios. Raises `InputError` for levels that are none in that
+    unit, and where counts would need another calibration.
+    """
+    if unit in ("sik", "raw"):
+        if unit == "raw" and len(calibration) < 2:
+            raise InputError(
+                f"{path}: a device's own counts; expected two of them in dBm by --calibrate "
+                "COUNT=DBM, or --unit rssi=sik, the counts of SiK radios"
+            )
+        slope, level = _SIK
+        (count, level), *more = calibration or [(0.0, level)]
+        for other, dbm in more:
+            slope = (dbm - level) / (other - count)
+        told, unit = level + slope * (told - count), "dbm"
+    unit = unit if unit in _SOUND else "mbit/s"
+    least, most = _SOUND.get(unit, (-math.inf, math.inf))
+    middle = float(np.median(told))
+    if not least <= middle <= most:
+        text = f"levels about {middle:g} {unit}; expected {least:g} to {most:g}: is that the unit?"
+        raise InputError(f"{path}: {text}")
+    return told, unit
 
 
 def samples_at(
     path: Path,
-    station: tuple[float, float, float],
+    station: Sequence[float],
     t: Real,
     latitude: Real,
     longitude: Real,
@@ -131,7 +163,7 @@ def samples_at(
     """Return levels (k,) at places of the log `path` as `Samples`; see `read_measured`."""
     if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
         raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
-    local = LocalFrame(*station[:2]).to_local(latitude, longitude)
+    local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
     away = float(np.median(np.hypot(*local.T)))
     if not away < _FARTHEST:
         raise InputError(
@@ -192,14 +224,3 @@ def _numbers(rows: Iterable[list[str]], columns: Mapping[str, int], *, comma: bo
 
     found = [[number(row, name) for name in columns] for row in rows]
     return np.array(found, dtype=np.float64).reshape(-1, len(columns))
-
-
-def _check(path: Path, level: Real, unit: str) -> None:
-    """Raise `InputError` for levels that are none in `unit`."""
-    least, most = _SOUND.get(unit, (-math.inf, math.inf))
-    middle = float(np.median(level))
-    if not least <= middle <= most:
-        raise InputError(
-            f"{path}: levels about {middle:g} {unit}; expected {least:g} to {most:g}: is that the "
-            "unit?"
-        )

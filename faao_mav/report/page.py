@@ -29,15 +29,18 @@ _PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")
 def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
     """Return the page about a planned flight, a mission that was checked, or a flight in a log.
 
-    The page is whole, offline, for light, dark, phone and paper. A part that a `Result` does not
-    have leaves its sections out. The title is the plan's name unless one is given. The same flight
-    gives the same text.
+    A part that a `Result` does not have leaves its sections out. The title is the plan's name
+    unless one is given. The same flight gives the same text.
     """
     if not title and isinstance(about, Result):
         title = about.solution.plan.name
-    title = escape(title or "Relay flight")
+    return page(title or "Relay flight", "\n".join(_sections(about)))
+
+
+def page(title: str, content: str) -> str:
+    """Return a whole page of sections, offline, for light, dark, phone and paper."""
+    title = escape(title)
     style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
-    sections = "\n".join(_sections(about))
     return f"""<!doctype html>
 <html lang="en">
 <head>
@@ -51,7 +54,7 @@ def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
 <body>
 <h1>{title}</h1>
 <main>
-{sections}
+{content}
 </main>
 <footer>{escape(_versions())}</footer>
 </body>
@@ -70,14 +73,14 @@ def _sections(about: Result | Check | FromLog) -> Iterator[str]:
     if judged is not None:
         lines += [("mission items", str(len(judged.mission.items))), *check_lines(judged)]
     if log is not None:
-        yield _section("Flown", _facts(log.lines()), "wide")
-    yield _section("Result" if log is None else "Planned", _facts(lines), "wide")
+        yield section("Flown", facts(log.lines()), "wide")
+    yield section("Result" if log is None else "Planned", facts(lines), "wide")
     if check is not None:
-        yield _section("Findings", _findings(check.findings), "wide")
+        yield section("Findings", _findings(check.findings), "wide")
     if result is not None and result.conversion is not None and result.conversion.parameters:
         rows = [(name, f"{value:g}") for name, value in result.conversion.parameters.items()]
         told = "<p>The mission is timed for these: load them first.</p>"
-        yield _section("Parameters", told + _table(("parameter", "value"), rows))
+        yield section("Parameters", told + _table(("parameter", "value"), rows))
     if judged is not None:
         yield from _mission_figures(judged)
     if check is not None and check.energy is not None:
@@ -85,14 +88,15 @@ def _sections(about: Result | Check | FromLog) -> Iterator[str]:
 
         what = "energy that is used" if check.energy.battery is None else "energy that is left"
         title = f"Power of the whole predicted flight over time, and the {what}"
-        yield _figure("energy", "Energy", energy(check.energy), title)
+        yield figure_section("energy", "Energy", energy(check.energy), title)
     if result is not None:
         yield from _plan_figures(result, log.found if log is not None else None)
         text = f"<pre>{escape(result.solution.plan.text)}</pre>"
-        yield _section("Plan", text, "wide text")
+        yield section("Plan", text, "wide text")
 
 
-def _facts(lines: Sequence[Line]) -> str:
+def facts(lines: Sequence[Line]) -> str:
+    """Return labelled lines as a list."""
     facts = "".join(
         (f"<dt>{escape(label)}</dt>" if label else "")
         + f"<dd>{escape(text.replace(' +- ', ' ± '))}</dd>"
@@ -120,9 +124,9 @@ def _mission_figures(check: Check) -> Iterator[str]:
     from faao_mav.report.maps import mission_map
 
     title = "Map of the predicted flight with the mission's items and its fence, metres"
-    yield _figure("mission-map", "Mission", mission_map(check.mission, check.track), title)
+    yield figure_section("mission-map", "Mission", mission_map(check.mission, check.track), title)
     title = "Predicted ground speed and height above home over time"
-    yield _figure("mission-motion", "Flight", mission_motion(check.track), title)
+    yield figure_section("mission-motion", "Flight", mission_motion(check.track), title)
 
 
 def _plan_figures(result: Result, debriefing: Debriefing | None) -> Iterator[str]:
@@ -143,42 +147,44 @@ def _plan_figures(result: Result, debriefing: Debriefing | None) -> Iterator[str
         title += ", and the track that was flown"
     if plan.fence:
         title += "; zones of the fence, and the margin that the plan keeps"
-    yield _figure("route", "Route", figures.route(solution, conversion, real), title)
+    yield figure_section("route", "Route", figures.route(solution, conversion, real), title)
     if debriefing is not None and real is not None:
         title = "Distance from the planned place at equal times, as predicted and as flown"
         figure = figures.apart(solution, debriefing.predicted, real)
-        yield _figure("apart", "Off the plan", figure, title)
+        yield figure_section("apart", "Off the plan", figure, title)
     title = (
         f"Speed over time, limit {vehicle.max_speed:g} m/s, and acceleration over time, limit "
         f"{vehicle.max_acceleration:g} m/s²"
     )
-    yield _figure("motion", "Motion", figures.motion(solution, conversion), title)
+    yield figure_section("motion", "Motion", figures.motion(solution, conversion), title)
     flown = " and along the predicted flight" if prediction else ""
     flown += " and as flown" if real is not None else ""
     title = f"Rates of both links over time, planned{flown}"
-    yield _figure("rates", "Link", figures.rates(solution, prediction, real), title)
+    yield figure_section("rates", "Link", figures.rates(solution, prediction, real), title)
     half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
     title = f"What the relay has received and not yet forwarded, over time{half}"
-    yield _figure("queue", "Queue", figures.queue(solution, prediction, real), title)
+    yield figure_section("queue", "Queue", figures.queue(solution, prediction, real), title)
     first, last = solution.history[0], solution.history[-1]
     title = (
         f"{maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz; "
         f"ended: {solution.ending}"
     )
-    yield _figure("convergence", "Convergence", figures.convergence(solution), title)
+    yield figure_section("convergence", "Convergence", figures.convergence(solution), title)
     title = "Power on each stream over time, base station and UAV, strongest stream first"
-    yield _figure("power", "Precoders", figures.precoder_power(solution), title)
+    yield figure_section("power", "Precoders", figures.precoder_power(solution), title)
     if len(solution.starts) > 1:
         ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
         rows = [(name, f"{rate:.4f}") for name, rate in ranked]
-        yield _section("Starts", _table(("start", f"{maximised}, bit/s/Hz"), rows))
+        yield section("Starts", _table(("start", f"{maximised}, bit/s/Hz"), rows))
 
 
-def _figure(name: str, heading: str, figure: "Figure", title: str) -> str:
-    return _section(heading, inline_svg(figure, name, title) + f"<p>{escape(title)}.</p>")
+def figure_section(name: str, heading: str, figure: "Figure", title: str) -> str:
+    """Return a figure under its heading, with what it shows below."""
+    return section(heading, inline_svg(figure, name, title) + f"<p>{escape(title)}.</p>")
 
 
-def _section(heading: str, content: str, kind: str = "") -> str:
+def section(heading: str, content: str, kind: str = "") -> str:
+    """Return a section under its heading; its `kind` are classes of the style."""
     marked = f' class="{kind}"' if kind else ""
     return f"<section{marked}>\n<h2>{heading}</h2>\n{content}\n</section>"
 

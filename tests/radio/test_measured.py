@@ -53,6 +53,21 @@ def test_units_that_a_header_does_not_tell_are_asked_for(tmp_path: Path) -> None
     np.testing.assert_allclose(found.samples.place[:, 2], 60 * 0.3048 - 10)
 
 
+def test_counts_of_a_device_are_calibrated(tmp_path: Path) -> None:
+    path = table(tmp_path, "time_s,lat,lon,alt_m,rssi", 100)
+    raw, sik = {"rssi": "raw"}, {"rssi": "sik"}
+    for units, calibration, level in (
+        (sik, (), 100 / 1.9 - 127),
+        (sik, [(119, -50)], -60.0),
+        (raw, [(0, -120), (200, -20)], -70.0),
+    ):
+        found = read_measured(path, STATION, units, calibration)
+        np.testing.assert_allclose(found.samples.level, level)
+        assert found.unit == "dbm"
+    with pytest.raises(InputError, match=r"expected two of them in dBm by --calibrate"):
+        read_measured(path, STATION, raw, [(0, -120)])
+
+
 def test_decimal_commas_times_of_day_and_rows_without_a_number(tmp_path: Path) -> None:
     header = "time;lat;lon;alt_m;snr_db"
     rows = [f"2024-05-01T10:00:{k:02d}Z;-34,999;149,0;60,0;1{k % 10},5" for k in range(20)]

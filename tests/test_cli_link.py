@@ -1,0 +1,128 @@
+"""`faao-mission link`: from logs of a flight to the file that a plan's `gain` names."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flight_logs import dataflash, heard, tlog, ulog
+from typer.testing import CliRunner
+
+from faao_mav.cli.main import app
+from faao_mav.geodesy import LocalFrame
+from faao_mav.validate.flown import FlightRecord
+
+STATION = (-35.36, 149.16, 5.0)
+PLACE = ",".join(map(str, STATION))
+LAW = (-45.0, 2.0)
+
+
+def record(height: float, spread: float = 2.0, seed: int = 0) -> FlightRecord:
+    """A flight about the station at a height above home, with what a SiK radio counts there."""
+    t = np.arange(0.0, 240.0, 0.5)
+    leg, along = np.divmod(8.0 * t, 320.0)
+    east = np.where(leg % 2 == 0, along - 150.0, 170.0 - along) + 7.0
+    north = 40.0 * leg - 60.0
+    latitude, longitude = LocalFrame(*STATION[:2]).to_geodetic(np.stack([east, north], axis=1))
+    up = height - STATION[2]
+    d = np.sqrt(east**2 + north**2 + up**2)
+    shadow = spread * np.random.default_rng(seed).standard_normal(len(t) // 8)
+    gain = LAW[0] - 10 * LAW[1] * np.log10(d) + np.repeat(shadow, 8)
+    count = np.round((20.0 + gain + 127.0) * 1.9)
+    home = np.full_like(t, 584.0)
+    wind = np.full((len(t), 2), np.nan)
+    return FlightRecord(t + 10.0, latitude, longitude, home + height, home, wind, count)
+
+
+def table(folder: Path, flight: FlightRecord, name: str = "flight.csv") -> Path:
+    path = folder / name
+    up = flight.altitude - flight.home
+    columns = (flight.t, flight.latitude, flight.longitude, up, flight.rssi / 1.9 - 127)
+    header = "time_s,latitude,longitude,altitude_m,rssi_dbm"
+    np.savetxt(path, np.stack(columns, axis=1), "%.8f", ",", header=header, comments="")
+    return path
+
+
+def link(*arguments: object, status: int = 0) -> str:
+    result = CliRunner().invoke(app, ["link", *map(str, arguments)])
+    assert result.exit_code == status, result.output + result.stderr
+    return result.stdout if status == 0 else result.stderr
+
+
+def test_logs_of_every_kind_give_the_law_that_was_flown(tmp_path: Path) -> None:
+    flights = [record(height, seed=k) for k, height in enumerate((50.0, 80.0, 120.0))]
+    first, second, third = flights
+    written = {"a.bin": dataflash(first), "b.tlog": tlog(heard(second)), "c.ulg": ulog(third)}
+    logs = [tmp_path / name for name in written]
+    for path in logs:
+        path.write_bytes(written[path.name])
+    out, page = tmp_path / "link.yaml", tmp_path / "link.html"
+    told = json.loads(
+        link(*logs, "--station", PLACE, "--unit", "rssi=sik", "--power", 20, "--out", out,
+             "--report", page, "--json")
+    )  # fmt: skip
+    assert told["heights"] == 3
+    assert told["exponent"] == 2.0
+    assert told["reference_gain_db"] == pytest.approx(LAW[0], abs=1.0)
+    assert told["spread_db"] == pytest.approx(2.0, rel=0.3)
+    law = out.read_text()
+    assert f"reference_gain_db: {told['reference_gain_db']:.2f}\n" in law
+    assert "a.bin, b.tlog, c.ulg" in law
+    text = page.read_text()
+    assert text.count("<svg") == 3
+    assert "<image" not in text
+
+
+def test_a_table_without_a_power_gives_the_shape_alone(tmp_path: Path) -> None:
+    path, out = table(tmp_path, record(60.0)), tmp_path / "link.yaml"
+    text = link(path, "--station", PLACE, "--out", out)
+    assert "shape only: the plan's radio.reference_gain_db stands" in text
+    assert "reference_gain_db" not in out.read_text()
+
+
+def test_where_no_law_holds_nothing_is_written(tmp_path: Path) -> None:
+    path, out = table(tmp_path, record(60.0, spread=25.0)), tmp_path / "link.yaml"
+    text = link(path, "--station", PLACE, "--out", out, status=1)
+    assert "no law of distance and elevation holds" in text
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--station", "1,2"], "--station 1,2: expected LAT,LON,HEIGHT"),
+        (["--station", "100,2,3"], "expected LAT,LON,HEIGHT"),
+        (["--station", "1,nan,3"], "expected LAT,LON,HEIGHT"),
+        (["--station", PLACE, "--unit", "rssi"], "--unit rssi: expected COLUMN=UNIT"),
+        (["--station", PLACE, "--calibrate", "3=x"], "--calibrate 3=x: expected COUNT=DBM"),
+        (["--station", PLACE, "--calibrate", "3=4", "--calibrate", "3=5"], "two different counts"),
+        (["--station", PLACE, "--out", "x.txt"], "x.txt"),
+        (["--station", PLACE, "--unit", "rssi=watt"], "'watt'; name it in the header"),
+    ],
+)
+def test_unusable_arguments_are_told(tmp_path: Path, arguments: list[str], message: str) -> None:
+    path = table(tmp_path, record(60.0))
+    assert message in " ".join(link(path, *arguments, status=2).split())
+
+
+def test_logs_without_a_radio_or_its_unit_are_told(tmp_path: Path) -> None:
+    flight, log = record(60.0), tmp_path / "flight.bin"
+    log.write_bytes(dataflash(flight))
+    assert "means of flight.bin" in link(log, "--station", PLACE, "--unit", "rssi=sik")
+    assert "--unit rssi=sik" in link(log, "--station", PLACE, status=2)
+    log.write_bytes(dataflash(replace(flight, rssi=np.full_like(flight.t, np.nan))))
+    assert "no radio tells a level in it" in link(log, "--station", PLACE, status=2)
+
+
+def test_a_ratio_to_the_noise_needs_both_powers(tmp_path: Path) -> None:
+    path = table(tmp_path, record(60.0))
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    rows[:, 4] += 100.0
+    header = "time_s,latitude,longitude,altitude_m,snr_db"
+    np.savetxt(path, rows, "%.8f", ",", header=header, comments="")
+    told = link(path, "--station", PLACE, "--power", 20, "--noise", -100, "--json")
+    assert json.loads(told)["reference_gain_db"] == pytest.approx(LAW[0], abs=1.5)
+    assert "give both --power and --noise" in link(
+        path, "--station", PLACE, "--power", 20, status=2
+    )
