@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
 from faao_mav.cli.shared import AsJson, File, Number, check_page, exit_status, note, option, show
@@ -108,6 +107,8 @@ def _flights(
     calibration: "Calibration",
 ) -> Iterator[tuple["Samples", str]]:
     """Yield the flights in a table or log, and the unit of what was measured."""
+    import numpy as np
+
     from faao_mav.radio.measured import level_of, read_measured, samples_at
 
     if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
