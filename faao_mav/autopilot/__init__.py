@@ -5,10 +5,10 @@ The four vehicles that are known are registered here; `register` adds another.
 
 from faao_mav.autopilot.ardupilot.copter import ARDUCOPTER as ARDUCOPTER
 from faao_mav.autopilot.ardupilot.plane import ARDUPLANE as ARDUPLANE
-from faao_mav.autopilot.flight_path import FlightModel as FlightModel
 from faao_mav.autopilot.flight_path import FlightPath as FlightPath
 from faao_mav.autopilot.flight_path import Flown as Flown
 from faao_mav.autopilot.flight_path import Track as Track
+from faao_mav.autopilot.model import Model as Model
 from faao_mav.autopilot.px4 import PX4_COPTER as PX4_COPTER
 from faao_mav.autopilot.px4 import PX4_PLANE as PX4_PLANE
 from faao_mav.autopilot.vehicle import Vehicle as Vehicle
@@ -24,9 +24,7 @@ from faao_mav.autopilot.vehicle import vehicle_type_by_numbers as vehicle_type_b
 from faao_mav.autopilot.vehicle import vehicle_types as vehicle_types
 from faao_mav.autopilot.vehicle_type import Autopilot as Autopilot
 from faao_mav.autopilot.vehicle_type import AutopilotFamily as AutopilotFamily
-from faao_mav.autopilot.vehicle_type import Ceiling as Ceiling
 from faao_mav.autopilot.vehicle_type import Kind as Kind
-from faao_mav.autopilot.vehicle_type import LegLimits as LegLimits
 from faao_mav.autopilot.vehicle_type import VehicleType as VehicleType
 
 for _vehicle_type in (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE):

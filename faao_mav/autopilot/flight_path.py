@@ -1,7 +1,6 @@
 """What a flight model is asked, what it answers, and the predicted flight of a whole mission."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,17 +96,6 @@ class Track:
             return self.position
         ground = frame.to_local(*self.frame.to_geodetic(self.position[:, :2]))
         return np.column_stack([ground, self.position[:, 2]])
-
-
-class FlightModel(Protocol):
-    """How a vehicle with given parameters flies a path."""
-
-    @property
-    def cruise_speed(self) -> float:
-        """The vehicle's own speed, flown where none is commanded, m/s."""
-
-    def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
-        """Return the predicted flight along `path`, sampled every `step` seconds."""
 
 
 @dataclass(frozen=True, slots=True)

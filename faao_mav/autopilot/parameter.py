@@ -1,10 +1,10 @@
 """One record for each parameter of an autopilot: its names, unit, default and bounds."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol, Self, TypeAlias
+from typing import Protocol, TypeAlias
 
 from faao_mav.autopilot.body import Body
 
@@ -98,42 +98,6 @@ class ParameterValues(Protocol):
 
     def value(self, key: str) -> float:
         """Return the value of the parameter `key` in the unit of its table."""
-
-
-def parameter(
-    unit: str, default: float, names: Mapping[str, float], *limits: float, **more: Any
-) -> Any:
-    """Declare a field of a `ParameterRecord`: the parameter whose key is the field's name.
-
-    `limits` are the least and the greatest value.
-    """
-    bounds = dict(zip(("least", "greatest"), limits, strict=False))
-    told = {"unit": unit, "default": default, "names": names, **bounds, **more}
-    return field(default=default, metadata=told)
-
-
-class ParameterRecord:
-    """Values of parameters: base of dataclasses whose fields are declared by `parameter`.
-
-    A field `body` is the airframe.
-    """
-
-    __slots__ = ()
-
-    @classmethod
-    def parameters(cls) -> Iterator[Parameter]:
-        """Yield the parameters that are fields."""
-        for each in fields(cls):  # type: ignore[arg-type]
-            if each.metadata:
-                yield Parameter(each.name, **each.metadata)
-
-    @classmethod
-    def from_vehicle(cls, vehicle: ParameterValues) -> Self:
-        """Return the values that `vehicle` has; raises `InputError` for one that is no use."""
-        values: dict[str, Any] = {each.key: vehicle.value(each.key) for each in cls.parameters()}
-        if vehicle.airframe is not None:
-            values["body"] = vehicle.airframe
-        return cls(**values)
 
 
 def table(*parameters: Parameter) -> ParameterTable:

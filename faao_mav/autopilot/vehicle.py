@@ -8,8 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from faao_mav.autopilot.body import Body, CopterBody
-from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
-from faao_mav.autopilot.vehicle_type import Autopilot, AutopilotFamily, Kind, LegLimits, VehicleType
+from faao_mav.autopilot.flight_path import VerticalProfile
+from faao_mav.autopilot.model import Model
+from faao_mav.autopilot.vehicle_type import (
+    Autopilot,
+    AutopilotFamily,
+    Kind,
+    VehicleType,
+    lean_acceleration,
+)
 from faao_mav.errors import InputError
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
@@ -122,25 +129,31 @@ class Vehicle:
         return replace(self, parameters=kept) if useless else self
 
     @property
-    def legs(self) -> LegLimits:
-        """How it flies a leg between two waypoints."""
-        if self.type.legs is None:
-            raise InputError(f"missions are not made for {self.type.name}")
-        return self.type.legs(self)
-
-    @property
     def vertical(self) -> VerticalProfile:
         """How it takes off, climbs, returns and lands."""
         return self.type.vertical(self)
 
-    def flight_model(self, latitude: float | None = None) -> FlightModel:
-        """Return how it flies a mission at `latitude`, degrees.
+    def flight_model(self, latitude: float | None = None) -> Model:
+        """Return how it flies at `latitude`, degrees.
 
         Raises `InputError` if there is no model of its type.
         """
         if self.type.flight_model is None:
             raise InputError(self.type.unmodelled)
         return self.type.flight_model(self, latitude)
+
+    def ceiling(self, key: str) -> tuple[float, str]:
+        """Return how far a plan's "max_speed" or "max_acceleration" may go for it, and why.
+
+        That is in m/s or m/s², infinite where nothing limits it.
+        """
+        limits = [(math.inf, "")]
+        if key == "max_speed" and self.type.hovers:
+            limits.append((self.type.fastest, "the most that it is told"))
+        for own in self.type.ceilings.get(key, ()):
+            value, angle = self.value(own), self.type.parameters[own].unit == "rad"
+            limits.append((lean_acceleration(value) if angle else value, self.name_of(own)))
+        return min(limits, key=lambda each: each[0])
 
 
 def register(vehicle_type: VehicleType) -> VehicleType:

@@ -3,14 +3,15 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
-from faao_mav.arrays import Flags, Real
+from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body
 from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.failsafe import Failsafe
-from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import FenceAction, Frame, Manners, Modes, SetpointRules
+from faao_mav.autopilot.model import Model
 from faao_mav.autopilot.orbit import Orbits, RallyRule, no_orbit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues
 from faao_mav.geodesy import LocalFrame
@@ -78,32 +79,6 @@ class AutopilotFamily:
 
 
 @dataclass(frozen=True, slots=True)
-class Ceiling:
-    """How far a plan's `key`, "max_speed" or "max_acceleration", may go for a vehicle to keep it.
-
-    `value` is in m/s or m/s²; `parameter` is the key of the vehicle's parameter that sets it, ""
-    for what the vehicle can be told at most.
-    """
-
-    key: Literal["max_speed", "max_acceleration"]
-    value: float
-    parameter: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class SpeedRates:
-    """How fast a vehicle's true airspeed V is made to change at most.
-
-    It falls by at most `fall`, m/s², and rises by `power` / V, with the `power` in m²/s³: W per kg.
-    Its guidance follows turns of at most `turn`, rad/s.
-    """
-
-    fall: float = math.inf
-    power: float = math.inf
-    turn: float = math.inf
-
-
-@dataclass(frozen=True, slots=True)
 class FenceResponse:
     """What a vehicle does that leaves the areas of its fence, and the parameter that decides.
 
@@ -118,49 +93,6 @@ class FenceResponse:
     def keeps(self) -> bool:
         """Whether it does anything about it."""
         return self.action not in ("nothing", "report")
-
-
-class LegDurations(Protocol):
-    """How long the legs (m - 1,) of a route take, from passing one end to passing the other."""
-
-    @property
-    def most(self) -> Real:
-        """The greatest commands that make a difference, (m - 1,), m/s."""
-
-    def flown(self, speeds: Real) -> tuple[Real, Real]:
-        """Return the speeds, m/s, that legs come to at the commands `speeds`, and durations, s.
-
-        Both have the shape of `speeds` (..., m - 1), m/s.
-        """
-
-
-class LegLimits(Protocol):
-    """How a vehicle with given parameters flies a leg between two waypoints."""
-
-    @property
-    def least(self) -> float:
-        """Shorter legs, m, are not flown: both their ends count as reached at once."""
-
-    @property
-    def run_in(self) -> float:
-        """The leg before a start at speed, as a multiple of the shortest leg for that speed."""
-
-    def shortest_leg(self, speed: Real) -> Real:
-        """Return the least length of a leg on which `speed`, m/s, is reached, m; same shape."""
-
-    def reachable_speed(self, length: Real) -> Real:
-        """Return the greatest speed reached on legs of `length`, m, in m/s; same shape."""
-
-    @property
-    def slowest(self) -> float:
-        """The least speed that is commanded for a leg, m/s: who has more time waits at its end."""
-
-    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
-        """Return acceptance radii, m, that suit waypoints; 0 leaves them to the autopilot.
-
-        `room` (n,), m, is the shorter of the legs at each waypoint that do not end at a stop,
-        `turn` (n,) the angle between them, rad; `stops` (n,) marks the waypoints at which it waits.
-        """
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,26 +117,18 @@ class VehicleType:
         at_fence: what it does when it leaves the areas of its fence.
         fence_ahead: how far ahead, m, it looks for its fence at a speed, m/s; 0: it acts when it is
             outside.
-        legs: how it flies a leg; None if missions are not made for it.
-        flight_model: how it flies a mission, with the latitude in degrees if that is known; None if
-            `unmodelled` says why there is no model.
+        flight_model: how it flies, with the latitude in degrees if that is known; None if
+            `unmodelled` says why there is no model: no missions are made for it.
         recommended: the sets of parameters to try for a plan's greatest speed, m/s, and
             acceleration, m/s², the gentlest first; one empty set: it flies with its own.
-        ceilings: how far a plan may go for the vehicle to keep it, beside `fastest`; the least of
-            those with one key counts.
+        ceilings: parameters that a plan's "max_speed" or "max_acceleration" may not exceed for the
+            vehicle to keep it, beside `fastest`; of angles what they give.
         body: the airframe of the autopilot's simulator, fitted to recorded flights; None where the
             model is compared with none.
         models_wind: its flight model flies in wind: what hovers in more than it can hold as well.
-        true_over_commanded: true airspeed over the one that a mission commands, at a height in m
-            above sea level; 1 where missions command ground speeds.
-        speed_rates: how fast its airspeed changes; infinitely if that is its acceleration's.
-        leg_durations: how long straight legs of given lengths, m, take, of which those are marked
-            that follow one without a stop; None if only a flight tells.
         orbits: how it circles at an item.
         rally: where a return goes when there are rally points.
         failsafes: what it does by itself on a loss.
-        corner_speed: the speed, m/s, at which it passes a waypoint where it turns by an angle in
-            radians; None if no such law is known.
     """
 
     family: AutopilotFamily
@@ -222,25 +146,15 @@ class VehicleType:
     home_outside_fence: str = ""
     at_fence: Callable[[ParameterValues], FenceResponse] = lambda _: FenceResponse("nothing", "")
     fence_ahead: Callable[[ParameterValues, Real], Real] = lambda _, speed: 0 * speed
-    legs: Callable[[ParameterValues], LegLimits] | None = None
-    flight_model: Callable[[ParameterValues, float | None], FlightModel] | None = None
+    flight_model: Callable[[ParameterValues, float | None], Model] | None = None
     unmodelled: str = ""
     recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
-    ceilings: Callable[[ParameterValues], Sequence[Ceiling]] = lambda _: ()
+    ceilings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     body: Body | None = None
     models_wind: bool = False
-    true_over_commanded: Callable[[ParameterValues, float], float] = lambda *_: 1.0
-    speed_rates: Callable[[ParameterValues], SpeedRates] = lambda _: SpeedRates()
-    leg_durations: Callable[[ParameterValues, Real, Flags], LegDurations] | None = None
     failsafes: tuple[Failsafe, ...] = ()
-    corner_speed: Callable[[ParameterValues, float], float] | None = None
     orbits: Orbits = no_orbit
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
-
-    @property
-    def planned(self) -> bool:
-        """Whether missions are made for it; those of others can be validated and uploaded."""
-        return self.legs is not None and self.flight_model is not None
 
     def defaults(self) -> dict[str, float]:
         """Return the defaults by the autopilot's oldest names, in the autopilot's own units.

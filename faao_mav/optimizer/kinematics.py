@@ -247,7 +247,7 @@ def kinematics(plan: Plan) -> Kinematics:
     """Return the feasible set of `plan`."""
     flight, vehicle = plan.flight, plan.vehicle
     aircraft = plan.aircraft
-    rates = aircraft.type.speed_rates(aircraft)
+    rates = aircraft.flight_model().speed_rates
     fastest = math.hypot(plan.max_ground_speed, _WIND_IN_TURNS * math.hypot(*plan.wind))
 
     def vector(value: tuple[float, float] | None) -> Real | None:

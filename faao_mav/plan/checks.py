@@ -41,7 +41,7 @@ def problems(plan: PlanContents) -> Iterator[str]:
 
 def _vehicle(plan: PlanContents) -> Iterator[str]:
     vehicle = plan.vehicle
-    planned = {each.family.key: each for each in vehicle_types(vehicle.type) if each.planned}
+    planned = {each.family.key: each for each in vehicle_types(vehicle.type) if each.flight_model}
     known = planned.get(vehicle.autopilot)
     if known is None:
         yield (

@@ -7,7 +7,7 @@ from math import floor, inf
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Ceiling, Vehicle
+from faao_mav.autopilot import Vehicle
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
@@ -59,7 +59,6 @@ def check_vehicle(plan: Plan) -> None:
     """
     check_transit(plan)
     vehicle = plan.aircraft
-    vehicle.legs  # noqa: B018
     vehicle.flight_model()
     if plan.vehicle.max_speed < SLOWEST:
         raise InputError(
@@ -88,7 +87,7 @@ def beyond_vehicle(plan: Plan) -> list[str]:
     vehicles = [_with(plan.aircraft, each) for each in plan.candidates]
     lines = []
     for key, unit in (("max_speed", "m/s"), ("max_acceleration", "m/s^2")):
-        limits = [_ceiling(vehicle, key) for vehicle in vehicles]
+        limits = [vehicle.ceiling(key) for vehicle in vehicles]
         most, why = max(limits)
         value = getattr(plan.vehicle, key)
         if value > most:
@@ -97,18 +96,6 @@ def beyond_vehicle(plan: Plan) -> list[str]:
                 f"plans of at most {floor(10 * most) / 10:g} {unit} ({why})"
             )
     return lines
-
-
-def _ceiling(vehicle: Vehicle, key: str) -> tuple[float, str]:
-    """Return the greatest value of a plan's `key` that `vehicle` keeps, and what sets it."""
-    kind = vehicle.type
-    told = [Ceiling("max_speed", kind.fastest)] if kind.hovers else []
-    own = [each for each in (*kind.ceilings(vehicle), *told) if each.key == key]
-    least = min(own, key=lambda each: each.value, default=None)
-    if least is None:
-        return inf, ""
-    name = vehicle.name_of(least.parameter) if least.parameter else "the most that it is told"
-    return least.value, name
 
 
 def _with(given: Vehicle, parameters: Mapping[str, float]) -> Vehicle:
@@ -211,5 +198,4 @@ def _altitude(plan: Plan) -> float:
 
 def _true_over_commanded(plan: Plan) -> float:
     """Return true over commanded airspeed at the height of the flight."""
-    vehicle = plan.aircraft
-    return vehicle.type.true_over_commanded(vehicle, _altitude(plan))
+    return plan.aircraft.flight_model().true_over_commanded(_altitude(plan))

@@ -108,7 +108,7 @@ class CopterScheduler(Scheduler):
         """
         planned_speed = lengths(self.w[inside + 1] - self.w[inside - 1])
         planned_speed /= self.t[inside + 1] - self.t[inside - 1]
-        legs, result = self.vehicle.legs, np.ones(len(inside), dtype=bool)
+        legs, result = self.model, np.ones(len(inside), dtype=bool)
         parts = (
             (route.positions[k], self.t[inside] - route.departures[k]),
             (route.positions[k + 1], route.arrivals[k + 1] - self.t[inside]),

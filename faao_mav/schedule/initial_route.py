@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import LegLimits
+from faao_mav.autopilot import Model
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route, sent_speeds
@@ -33,7 +33,7 @@ def initial_route(t: ArrayLike, w: ArrayLike, plan: Plan, *, share: float = 1.0)
     positions at those times, metres. Raises `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
-    legs, slowest = plan.aircraft.legs, slowest_leg(plan)
+    legs, slowest = plan.aircraft.flight_model(), slowest_leg(plan)
     tolerance = share * plan.mission.path_tolerance
     fixed = hovers_and_ends(times, positions, tolerance, slowest)
     waypoints = [fixed[0]]
@@ -52,10 +52,10 @@ def slowest_leg(plan: Plan) -> float:
 
     Where the plan is slower it waits. It is half of `max_speed` at most.
     """
-    return min(plan.aircraft.legs.slowest, plan.vehicle.max_speed / 2)
+    return min(plan.aircraft.flight_model().slowest, plan.vehicle.max_speed / 2)
 
 
-def with_run_in(route: Route, t: Real, w: Real, legs: LegLimits, max_speed: float) -> Route:
+def with_run_in(route: Route, t: Real, w: Real, legs: Model, max_speed: float) -> Route:
     """Return `route` with a leg on which the aircraft reaches the plan's first speed before w_I.
 
     Likewise with one after w_F, so that the aircraft does not brake before it. Ends at which the

@@ -41,7 +41,7 @@ class PlaneScheduler(Scheduler):
 
         Its speeds are the airspeeds to command for the plan's.
         """
-        ratio = self.vehicle.type.true_over_commanded(self.vehicle, self.altitude)
+        ratio = self.model.true_over_commanded(self.altitude)
         route = self._with(route, self._changes(route))
         ways = np.diff(route.positions, axis=0)
         ground = ways * (route.speeds / lengths(ways))[:, None]
@@ -86,9 +86,7 @@ class PlaneScheduler(Scheduler):
         """
         middle = (self.t[1:] + self.t[:-1]) / 2
         speed = lengths(np.diff(self.w, axis=0)) / np.diff(self.t)
-        reach = (
-            np.ptp(speed) / self.vehicle.type.speed_rates(self.vehicle).fall / 2 + _CHANGE_SPACING
-        )
+        reach = np.ptp(speed) / self.model.speed_rates.fall / 2 + _CHANGE_SPACING
         times: list[float] = []
         for time in np.arange(self.t[0], self.t[-1], _CHANGE_SPACING).tolist():
             near = speed[np.abs(middle - time) <= reach]
@@ -116,5 +114,5 @@ class PlaneScheduler(Scheduler):
 
     def retimed(self, schedule: Schedule) -> Retimed:
         """Return what `schedule` becomes at other commands, which take effect with a lag."""
-        ratio = self.vehicle.type.true_over_commanded(self.vehicle, self.altitude)
+        ratio = self.model.true_over_commanded(self.altitude)
         return LaggedRetimed(schedule, ratio, self.wind)

@@ -4,7 +4,7 @@ Legs are causal. The speed of a leg changes how long the part of it takes that i
 command, a wait how long the aircraft stays; everything behind comes later by as much, along the
 same path. So one predicted flight tells how all its positions depend on all its commands, and no
 further flight has to be predicted for a slope. How long legs take at other speeds is known of some
-autopilots (``vehicle_type.LegDurations``); of others the flight tells.
+autopilots (``model.LegDurations``); of others the flight tells.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.autopilot.vehicle_type import LegDurations
+from faao_mav.autopilot.model import LegDurations
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.vector import lengths

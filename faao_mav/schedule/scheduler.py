@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.autopilot import FlightModel, Vehicle
+from faao_mav.autopilot import Model, Vehicle
 from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.retimed import LegRetimed, Retimed
@@ -48,7 +48,7 @@ class Scheduler(ABC):
     t: Real
     w: Real
     vehicle: Vehicle
-    model: FlightModel
+    model: Model
     min_speed: float
     max_speed: float
     tolerance: float
@@ -57,7 +57,7 @@ class Scheduler(ABC):
 
     def first(self, route: Route) -> Schedule:
         """Return `route`, with the run-in that the plan needs, in its first fit to the plan."""
-        return self._first(with_run_in(route, self.t, self.w, self.vehicle.legs, self.max_speed))
+        return self._first(with_run_in(route, self.t, self.w, self.model, self.max_speed))
 
     @abstractmethod
     def _first(self, route: Route) -> Schedule: ...
@@ -104,9 +104,8 @@ class Scheduler(ABC):
 
     def retimed(self, schedule: Schedule) -> Retimed:
         """Return what `schedule` becomes at other commands."""
-        route, known = schedule.route, self.vehicle.type.leg_durations
-        durations = known and known(self.vehicle, route.leg_lengths, route.joined)
-        return LegRetimed(schedule, durations)
+        route = schedule.route
+        return LegRetimed(schedule, self.model.leg_durations(route.leg_lengths, route.joined))
 
     def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
         """Return the route with the waypoints `points` (k,) moved against the flight's offset.
@@ -166,7 +165,7 @@ class Scheduler(ABC):
         onward = np.where(route.waits[1:] > 0, np.inf, route.leg_lengths)  # it waits there anyway
         leg_lengths = np.concatenate([[np.inf], onward, [np.inf]])
         room = np.minimum(leg_lengths[:-1], leg_lengths[1:])
-        radii = self.vehicle.legs.radii(room, route.turns, stops)
+        radii = self.model.radii(room, route.turns, stops)
         return replace(route, radii=np.round(radii, 1))
 
     def _clock(self, route: Route) -> Clock:

@@ -132,7 +132,8 @@ def _reached_speeds(context: ValidationContext) -> list[tuple[Straight, float]]:
     legs = [leg for leg in legs if leg.start.index != HOME and not leg.jump]
     if context.track is None:
         legs = [leg for leg in legs if not leg.spline]
-        reachable = context.vehicle.legs.reachable_speed(np.array([leg.length for leg in legs]))
+        lengths = np.array([leg.length for leg in legs])
+        reachable = context.vehicle.flight_model().reachable_speed(lengths)
         return [(leg, min(float(v), leg.speed)) for leg, v in zip(legs, reachable, strict=True)]
     fastest = np.full(len(context.items), -np.inf)
     np.maximum.at(fastest, context.track.item, np.hypot(*context.track.velocity[:, :2].T))
@@ -186,9 +187,10 @@ def _sharp(context: ValidationContext) -> Hits:
         if leg.speed > _SLOW and math.degrees(turn) > SHARP
     ]
     if sharp:
-        (turn, _, leg), slow, passing = max(sharp), "", context.vehicle.type.corner_speed
+        (turn, _, leg), slow = max(sharp), ""
+        passing = context.vehicle.flight_model().corner_speed(math.radians(turn))
         if passing is not None:
-            slow = f", passed at about {passing(context.vehicle, math.radians(turn)):.1f} m/s"
+            slow = f", passed at about {passing:.1f} m/s"
         count = "1 corner" if len(sharp) == 1 else f"{len(sharp)} corners"
         yield hit("sharp-corners", leg.index, count=count, turn=turn, leg=leg, slow=slow)
 

@@ -58,24 +58,13 @@ TABLE = table(
 )
 
 
-def fly(vehicle: ParameterValues, latitude: float | None) -> Px4:
-    """It flies like something that is known, at its own speed and acceleration."""
-    assert latitude is None or abs(latitude) <= 90
-    return Px4(
-        cruise_speed=vehicle.value("cruise_speed"),
-        acceleration=vehicle.value("acceleration"),
-        jerk=20.0,
-        error_limit=10.0,
-    )
-
-
 @dataclass(frozen=True)
-class ToyLegs:
-    """v² = a d: half the leg to speed up, half to slow down."""
+class Toy(Px4):
+    """It flies like something that is known, on legs of v² = a d: half to speed up."""
 
-    acceleration: float
+    jerk: float = 20.0
+    error_limit: float = 10.0
     least = 3.0
-    run_in = 1.2
     slowest = 0.1
 
     def shortest_leg(self, speed: Real) -> Real:
@@ -86,6 +75,14 @@ class ToyLegs:
 
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         return np.minimum(4.0, 0.4 * room) + 0 * turn
+
+
+def model(vehicle: ParameterValues, latitude: float | None) -> Toy:
+    """At its own speed and acceleration."""
+    assert latitude is None or abs(latitude) <= 90
+    return Toy(
+        cruise_speed=vehicle.value("cruise_speed"), acceleration=vehicle.value("acceleration")
+    )
 
 
 COPTER = VehicleType(
@@ -122,8 +119,7 @@ COPTER = VehicleType(
         return_height=vehicle.value("return_height"),
         spool=1.0,
     ),
-    legs=lambda vehicle: ToyLegs(vehicle.value("acceleration")),
-    flight_model=fly,
+    flight_model=model,
     recommended=lambda speed, _: ({"TOY_SPEED": speed, "TOY_ACCEL": 5.0},),
 )
 

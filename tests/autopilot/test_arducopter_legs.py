@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
 from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, ramp
-from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.autopilot.ardupilot.copter.target import Target
 from faao_mav.autopilot.stepper import STEP
 
-MODELS = st.builds(ArduCopterLimits, acceleration=st.floats(0.5, 8), jerk=st.floats(0.5, 20))
+MODELS = st.builds(ArduCopter, acceleration=st.floats(0.5, 8), jerk=st.floats(0.5, 20))
 
 
 def ends_at_rest(points: int) -> Flags:
@@ -23,12 +23,12 @@ def ends_at_rest(points: int) -> Flags:
     return stops
 
 
-def target_of(points: Real, speeds: Real, stops: Flags, limits: ArduCopterLimits) -> Target:
+def target_of(points: Real, speeds: Real, stops: Flags, limits: ArduCopter) -> Target:
     return Target(points, speeds, np.zeros(len(points), dtype=bool), stops, limits)
 
 
 @given(MODELS, st.floats(0.01, 15))
-def test_a_ramp_keeps_its_limits_and_adds_up(limits: ArduCopterLimits, change: float) -> None:
+def test_a_ramp_keeps_its_limits_and_adds_up(limits: ArduCopter, change: float) -> None:
     one = ramp(limits, np.array([change]), limits.acceleration)
     t = np.linspace(0, float(one.duration[0]), 2001)
     s, v, a = change * one[np.zeros(2001, dtype=int)].at(t)
@@ -44,7 +44,7 @@ def test_a_ramp_keeps_its_limits_and_adds_up(limits: ArduCopterLimits, change: f
 
 @given(MODELS, st.floats(0.3, 12), st.floats(1, 400), st.floats(0, 50))
 def test_the_target_reaches_what_a_leg_has_room_for_and_ends_at_rest(
-    limits: ArduCopterLimits, speed: float, length: float, rise: float
+    limits: ArduCopter, speed: float, length: float, rise: float
 ) -> None:
     points = np.array([[0.0, 0.0, 30.0], [0.0, length, 30.0 + rise]])
     target = target_of(points, np.array([speed]), ends_at_rest(2), limits)
@@ -60,7 +60,7 @@ def test_the_target_reaches_what_a_leg_has_room_for_and_ends_at_rest(
 def test_a_long_leg_has_two_full_ramps_and_a_cruise() -> None:
     # D = v/A + A/J + t_j, T = 2 D + (L - v D)/v
     duration = 8 / 2.5 + 2.5 / 1 + 0.3
-    legs = StraightLegs(np.array([200.0]), np.array([False]), ArduCopterLimits())
+    legs = StraightLegs(np.array([200.0]), np.array([False]), ArduCopter())
     assert legs.flown(np.array([8.0]))[1] == pytest.approx(duration + 200 / 8)
 
 
@@ -73,17 +73,17 @@ def test_measured_speeds_after_a_change_on_a_short_leg(
 ) -> None:
     """As ArduCopter's log has them: legs of a mission with WPNAV_ACCEL 400 and WPNAV_JERK 20."""
     legs = StraightLegs(
-        np.array([length]), np.array([True]), ArduCopterLimits(acceleration=4.0, jerk=20.0)
+        np.array([length]), np.array([True]), ArduCopter(acceleration=4.0, jerk=20.0)
     )
     assert legs.speeds(np.array([before]), np.array([told]))[2] == pytest.approx(reached, abs=0.04)
 
 
 def test_the_jerk_rises_no_faster_than_the_aircraft_leans() -> None:
     """Half of what leaning at 1100 degrees/s² gives is slower than ATC_INPUT_TC from 18 m/s³ on."""
-    assert ArduCopterLimits(jerk=17).rise == pytest.approx(0.3)
+    assert ArduCopter(jerk=17).rise == pytest.approx(0.3)
     half = 9.80665 * math.radians(1100) / 2
-    assert ArduCopterLimits(jerk=20).rise == pytest.approx(math.pi * 20 / (2 * half))
-    assert ArduCopterLimits(jerk=20, roll_acceleration=0, pitch_acceleration=0).rise == 0.3
+    assert ArduCopter(jerk=20).rise == pytest.approx(math.pi * 20 / (2 * half))
+    assert ArduCopter(jerk=20, roll_acceleration=0, pitch_acceleration=0).rise == 0.3
 
 
 @pytest.mark.parametrize("degrees", [5, 30, 90, 150])
@@ -92,7 +92,7 @@ def test_corners_are_as_early_as_their_limits_allow(degrees: float) -> None:
     points = np.array([[0.0, 0, 30], [100, 0, 30], [100 + turn.real, turn.imag, 30]])
 
     def nearest(radius: float) -> tuple[float, Real]:
-        limits = ArduCopterLimits(radius=radius, corner_acceleration=5.0)
+        limits = ArduCopter(radius=radius, corner_acceleration=5.0)
         target = target_of(points, np.array([8.0, 8.0]), ends_at_rest(3), limits)
         k = target.passed[1] / STEP
         place = [np.interp(k, np.arange(len(target.motion)), x) for x in target.motion.T]
@@ -114,7 +114,7 @@ def test_legs_take_as_long_as_the_target_takes() -> None:
         lengths, stops = rng.uniform(8, 120, count), ends_at_rest(count + 1)
         stops[1:-1] = rng.random(count - 1) < 0.2
         speeds = rng.uniform(1.5, 10, count)
-        limits = ArduCopterLimits(acceleration=rng.uniform(1.5, 5), jerk=rng.uniform(5, 20))
+        limits = ArduCopter(acceleration=rng.uniform(1.5, 5), jerk=rng.uniform(5, 20))
         points = np.zeros((count + 1, 3))
         points[1:, 0] = np.cumsum(lengths)
         joined = ~stops[:-1]
@@ -126,7 +126,7 @@ def test_legs_take_as_long_as_the_target_takes() -> None:
 
 
 def test_a_command_counts_up_to_what_a_leg_or_the_next_comes_to() -> None:
-    limits, lengths = ArduCopterLimits(acceleration=4.0, jerk=10.0), np.array([12.0, 40.0, 6.0])
+    limits, lengths = ArduCopter(acceleration=4.0, jerk=10.0), np.array([12.0, 40.0, 6.0])
     alone, joined = (
         StraightLegs(lengths, np.array([False, follows, follows]), limits)
         for follows in (False, True)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.px4 import Px4, Px4Legs
+from faao_mav.autopilot.px4 import Px4
 from faao_mav.autopilot.px4.guidance import GuidedLeg, headed, legs
 from faao_mav.autopilot.px4.smoothing import Axis, follow
 
@@ -78,7 +78,7 @@ def test_radii_are_a_metre_at_least_and_none_narrows_in_a_corner(seed: int) -> N
     room, turn = rng.uniform(1, 100, 12), rng.uniform(0, 3, 12) * (rng.uniform(size=12) < 0.7)
     stops = rng.uniform(size=12) < 0.2
     stops[[0, -1]] = True
-    radii = Px4Legs(acceleration=5.0, jerk=20.0).radii(room, turn, stops)
+    radii = Px4(acceleration=5.0, jerk=20.0).radii(room, turn, stops)
     assert radii.min() >= 1.0
     assert not any(narrowing(radii, turn, stops))
 

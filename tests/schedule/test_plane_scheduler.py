@@ -59,7 +59,7 @@ def followed_unmoved(t: np.ndarray, w: np.ndarray, plan: Plan) -> float:
     """How far the flight strays whose waypoints lie on the path, m."""
     vehicle = plan.aircraft
     scheduler = PlaneScheduler(t, w, vehicle, ArduPlane.from_vehicle(vehicle), 12.0, 16.0, 5.0)
-    route = with_run_in(initial_route(t, w, plan, share=0.4), t, w, vehicle.legs, 16.0)
+    route = with_run_in(initial_route(t, w, plan, share=0.4), t, w, vehicle.flight_model(), 16.0)
     return scheduler.flight(route).deviation.path
 
 

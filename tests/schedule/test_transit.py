@@ -101,7 +101,7 @@ def test_a_run_in_has_to_be_free_as_well() -> None:
     )
     for plan in (free, blocked):
         route = initial_route(T, W, plan)
-        route = with_run_in(route, T, W, plan.aircraft.legs, 8.0)
+        route = with_run_in(route, T, W, plan.aircraft.flight_model(), 8.0)
         assert route.first == 1
         if plan is free:
             assert assemble(route, plan).items

@@ -11,29 +11,24 @@ documented defaults. Flights: PX4 1.16 in simulation.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from math import cos
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
-from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
 from faao_mav.autopilot.px4.dialect import DIALECT
 from faao_mav.autopilot.px4.failsafes import FAILSAFES
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
-from faao_mav.autopilot.px4.guidance import corner_speed
-from faao_mav.autopilot.px4.legs import Px4Legs as Px4Legs
 from faao_mav.autopilot.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.autopilot.vehicle_type import (
     OVERSPEED,
     AutopilotFamily,
-    Ceiling,
     FenceResponse,
     VehicleType,
-    lean_acceleration,
 )
 from faao_mav.geodesy import LocalFrame
 
@@ -181,10 +176,6 @@ def _plane_vertical(vehicle: ParameterValues) -> VerticalProfile:
     return VerticalProfile(climb, climb, climb, 1.0, climb, 0.0, height, 0.0, lands_on_return=False)
 
 
-def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # noqa: ARG001
-    return Px4.from_vehicle(vehicle)
-
-
 def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
     speed = min(max_speed, _FASTEST)
     top = round(min(OVERSPEED * speed, _FASTEST), 2)
@@ -201,21 +192,6 @@ def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[
             "height_radius": _HEIGHT_RADIUS,
         }
         yield {table[key].newest_name: value for key, value in values.items()}
-
-
-def _corner_speed(vehicle: ParameterValues, turn: float) -> float:
-    keys = ("corner_gain", "acceleration", "acceptance_radius")
-    gain, acceleration, radius = (vehicle.value(key) for key in keys)
-    return corner_speed(gain, acceleration, radius, cos(turn))
-
-
-def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
-    lean = lean_acceleration(vehicle.value("lean_angle"))
-    return (
-        Ceiling("max_speed", vehicle.value("max_speed"), "max_speed"),
-        Ceiling("max_acceleration", lean, "lean_angle"),
-        Ceiling("max_acceleration", vehicle.value("acceleration"), "acceleration"),
-    )
 
 
 def _rally(vehicle: ParameterValues) -> RallyRule:
@@ -243,12 +219,10 @@ PX4_COPTER = VehicleType(
     failsafes=FAILSAFES,
     fence_ahead=_fence_ahead,
     fastest=_FASTEST,
-    legs=Px4Legs.from_vehicle,
-    flight_model=_model,
+    flight_model=Px4.from_vehicle,
     recommended=lambda *limits: tuple(_recommended(*limits)),
-    ceilings=_ceilings,
+    ceilings={"max_speed": ("max_speed",), "max_acceleration": ("lean_angle", "acceleration")},
     body=PX4_BODY,
-    corner_speed=_corner_speed,
     rally=_rally,
 )
 """A multicopter with PX4 1.16."""

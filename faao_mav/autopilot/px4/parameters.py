@@ -8,7 +8,8 @@ from math import inf, radians
 from typing import Any
 
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
-from faao_mav.autopilot.parameter import Parameter, ParameterRecord, parameter, table
+from faao_mav.autopilot.model import Model, parameter
+from faao_mav.autopilot.parameter import Parameter, table
 
 
 def _own(unit: str, default: float, name: str, least: float = 0.1, **more: Any) -> Any:
@@ -43,7 +44,7 @@ _SHARED = (
 
 
 @dataclass(frozen=True, slots=True)
-class Px4Limits(ParameterRecord):
+class Px4Limits(Model):
     """What bounds a multicopter's flight, in SI units; `body` is the aircraft.
 
     In missions it climbs at MPC_Z_V_AUTO_UP, which PX4 lowers to MPC_Z_VEL_MAX_UP (mc_pos_control,

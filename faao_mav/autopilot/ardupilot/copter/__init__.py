@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Mapping
 
-from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot import (
     ARDUPILOT,
     HOME_OUTSIDE_FENCE,
@@ -12,9 +11,7 @@ from faao_mav.autopilot.ardupilot import (
     rally_rule,
 )
 from faao_mav.autopilot.ardupilot.copter.flight_model import ArduCopter as ArduCopter
-from faao_mav.autopilot.ardupilot.copter.legs import ArduCopterLegs as ArduCopterLegs
-from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs
-from faao_mav.autopilot.ardupilot.copter.parameters import TABLE, ArduCopterLimits
+from faao_mav.autopilot.ardupilot.copter.parameters import TABLE
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
@@ -22,7 +19,7 @@ from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
-from faao_mav.autopilot.vehicle_type import Ceiling, VehicleType
+from faao_mav.autopilot.vehicle_type import VehicleType
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
 
@@ -83,18 +80,6 @@ def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[
         yield {name: TABLE[key].written(value, name) for name, (key, value) in (old | new).items()}
 
 
-def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
-    limits = ArduCopterLimits.from_vehicle(vehicle)
-    return (
-        Ceiling("max_acceleration", limits.lean, "lean_angle"),
-        Ceiling("max_acceleration", limits.acceleration, "acceleration"),
-    )
-
-
-def _leg_durations(vehicle: ParameterValues, lengths: Real, joined: Flags) -> StraightLegs:
-    return StraightLegs(lengths, joined, ArduCopterLimits.from_vehicle(vehicle))
-
-
 def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
     """Return how a NAV_LOITER_TURNS is flown (AC_Circle), turning by half of the acceleration.
 
@@ -133,13 +118,11 @@ ARDUCOPTER = VehicleType(
     home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
     failsafes=COPTER_FAILSAFES,
-    legs=ArduCopterLegs.from_vehicle,
     flight_model=ArduCopter.from_vehicle,
     recommended=lambda *limits: tuple(_recommended(*limits)),
-    ceilings=_ceilings,
+    ceilings={"max_acceleration": ("lean_angle", "acceleration")},
     body=ARDUCOPTER_BODY,
     models_wind=True,
-    leg_durations=_leg_durations,
     orbits=_orbit,
     rally=rally_rule,
 )

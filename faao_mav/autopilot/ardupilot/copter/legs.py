@@ -16,7 +16,7 @@ to the speed e, if the cruise has room for one. A last ramp ends at rest.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -27,22 +27,12 @@ _JERK_TIMES = 12.0
 """The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
 which none is longer than a second: the autopilot's own rule."""
 
-_FASTEST = 40.0
+FASTEST = 40.0
 """The speed, m/s, that no leg comes to. Chosen above all that is commanded."""
 
 _HALVINGS = 9
 """How often an interval is halved that holds what is sought, before it lies on a line between both
 ends. Chosen: of 40 m/s 0.08 are left."""
-
-_SLOWEST = 0.75
-"""The least speed that is commanded, m/s. Measured, flown and planned, m rms, on a plan with two
-hovers at 9 m/s: with 0.4 6.0, with 0.75 1.6, with 1.5 1.3; with 1.5 other plans need more items and
-twice the time to convert."""
-
-_SHORTEST = 4.0
-"""The least length of a leg, m, where the path needs no shorter one: on such centimetres decide how
-long the target waits for an aircraft that has passed it. Flown: a mission with 1.1 m before a hover
-left there 4.1 s late, one with 2.3 m 0.4 s."""
 
 
 def largest(function: Callable[[Real], Real], value: Real, most: Real | float) -> Real:
@@ -92,31 +82,6 @@ class Ramp:
         return np.array([distance, np.where(late, 1 - peak * speed, peak * speed), acceleration])
 
 
-@dataclass(frozen=True, slots=True)
-class ArduCopterLegs(ArduCopterLimits):
-    """How ArduCopter flies a leg between plain waypoints."""
-
-    least: ClassVar[float] = _SHORTEST
-    slowest: ClassVar[float] = _SLOWEST
-    run_in: ClassVar[float] = 1.2
-
-    def shortest_leg(self, speed: Real) -> Real:
-        """Return the least length of a leg that reaches `speed`, m: two ramps; same shape.
-
-        >>> float(ArduCopterLegs().shortest_leg(np.array(8.0)).round(1))
-        48.0
-        """
-        return speed * ramp(self, speed, self.acceleration).duration
-
-    def reachable_speed(self, length: Real) -> Real:
-        """Return the speed that legs of `length`, m, reach, m/s; same shape."""
-        return largest(self.shortest_leg, length, _FASTEST)
-
-    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
-        """Return acceptance radii, m: 0, for ArduCopter stores none; the shape of `turn`."""
-        return np.zeros_like(turn)
-
-
 def ramp(limits: ArduCopterLimits, change: Real, acceleration: Real | float) -> Ramp:
     """Return ramps by `change` >= 0, m/s, within an `acceleration`, m/s²."""
     jerk, rise = limits.jerk, limits.rise
@@ -133,7 +98,8 @@ class StraightLegs:
 
     `joined` (m - 1,) marks those that follow one without a stop.
 
-    >>> joined, limits = np.array([False, True, True]), ArduCopterLimits(acceleration=3.0, jerk=5.0)
+    >>> from faao_mav.autopilot.ardupilot.copter import ArduCopter
+    >>> joined, limits = np.array([False, True, True]), ArduCopter(acceleration=3.0, jerk=5.0)
     >>> legs = StraightLegs(np.array([50.0, 12.0, 50.0]), joined, limits)
     >>> flown, durations = legs.flown(np.array([4.0, 8.0, 8.0]))
     >>> flown, durations.round(1)  # the second leg is too short to be faster than the first
@@ -153,7 +119,7 @@ class StraightLegs:
     @cached_property
     def top(self) -> Real:
         """The greatest speeds that the legs come to, (m - 1,), m/s; above 0 without a length."""
-        found = largest(lambda v: v * self.ramp(v).duration, self.lengths, _FASTEST)
+        found = largest(lambda v: v * self.ramp(v).duration, self.lengths, FASTEST)
         return np.maximum(found, 1e-3)
 
     @property

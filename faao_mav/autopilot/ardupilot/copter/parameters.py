@@ -10,13 +10,8 @@ from typing import Any, Self
 
 from faao_mav.autopilot.ardupilot import DEGREE, SHARED, rally_parameters, switch
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
-from faao_mav.autopilot.parameter import (
-    Parameter,
-    ParameterRecord,
-    ParameterValues,
-    parameter,
-    table,
-)
+from faao_mav.autopilot.model import Model, parameter
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
 from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.power import GRAVITY
 
@@ -43,7 +38,7 @@ _LEAST_INPUT_TIME = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class ArduCopterLimits(ParameterRecord):
+class ArduCopterLimits(Model):
     """What bounds a flight of ArduCopter, in SI units.
 
     A `corner_acceleration` of 0 stands for twice `acceleration`. `east_metre` and `north_metre` are

@@ -10,14 +10,13 @@ from faao_mav.autopilot.ardupilot import (
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPlane
-from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlaneLegs
-from faao_mav.autopilot.ardupilot.plane.parameters import TABLE, ArduPlaneLimits
+from faao_mav.autopilot.ardupilot.plane.parameters import TABLE
 from faao_mav.autopilot.body import ARDUPLANE_BODY
-from faao_mav.autopilot.flight_path import FlightModel, VerticalProfile
+from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues
-from faao_mav.autopilot.vehicle_type import Ceiling, SpeedRates, VehicleType, lean_acceleration
+from faao_mav.autopilot.vehicle_type import VehicleType
 
 _LOITER, _RTL = 12, 11
 _MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
@@ -41,24 +40,6 @@ def _vertical(vehicle: ParameterValues) -> VerticalProfile:
     )
 
 
-def _model(vehicle: ParameterValues, latitude: float | None) -> FlightModel:  # noqa: ARG001
-    return ArduPlane.from_vehicle(vehicle)
-
-
-def _true_over_commanded(vehicle: ParameterValues, altitude: float) -> float:
-    return ArduPlaneLimits.from_vehicle(vehicle).true_over_commanded(altitude)
-
-
-def _ceilings(vehicle: ParameterValues) -> tuple[Ceiling, ...]:
-    """A turn accelerates by what the bank gives; airspeeds have limits of their own."""
-    bank = lean_acceleration(vehicle.value("roll_limit"))
-    return (Ceiling("max_acceleration", bank, "roll_limit"),)
-
-
-def _speed_rates(vehicle: ParameterValues) -> SpeedRates:
-    return ArduPlaneLimits.from_vehicle(vehicle).speed_rates
-
-
 ARDUPLANE = VehicleType(
     family=ARDUPILOT,
     kind="plane",
@@ -73,13 +54,10 @@ ARDUPLANE = VehicleType(
     home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report"}),
     failsafes=PLANE_FAILSAFES,
-    legs=ArduPlaneLegs.from_vehicle,
-    flight_model=_model,
-    ceilings=_ceilings,
+    flight_model=ArduPlane.from_vehicle,
+    ceilings={"max_acceleration": ("roll_limit",)},
     body=ARDUPLANE_BODY,
     models_wind=True,
-    true_over_commanded=_true_over_commanded,
-    speed_rates=_speed_rates,
     orbits=plane_orbit,
     rally=rally_rule,
 )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Real
+from faao_mav.arrays import Real
 from faao_mav.autopilot.ardupilot.plane.parameters import ArduPlaneLimits
 from faao_mav.autopilot.atmosphere import density_ratio
 from faao_mav.autopilot.flight_path import FlightPath, Flown
@@ -35,8 +35,17 @@ _SHORTEST = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
-class ArduPlaneLegs(ArduPlaneLimits):
-    """How ArduPlane flies a leg."""
+class ArduPlane(ArduPlaneLimits):
+    """How ArduPlane flies plain waypoints in AUTO, in a steady wind.
+
+    After ArduPilot's documentation (Plane: navigation tuning, parameter list), with constants from
+    flights of its simulator: lateral guidance `NAVL1` within the roll limit, airspeed and height by
+    total energy control. A waypoint is reached within its acceptance radius or on passing the
+    perpendicular through it. Where the waypoint gives no radius it is the least of WP_RADIUS, over
+    the density's ratio, and the guidance's look-ahead, for turns below 90 degrees in proportion to
+    the turn. Commanded speeds are equivalent airspeeds. ArduPlane has no hold at a plain waypoint,
+    so `FlightPath.holds` do not count. Limits are SI, angles radians.
+    """
 
     least: ClassVar[float] = 0.0
     slowest: ClassVar[float] = 0.1
@@ -49,24 +58,6 @@ class ArduPlaneLegs(ArduPlaneLimits):
     def reachable_speed(self, length: Real) -> Real:
         """Return the speed at which legs of `length`, m, are not cut short, m/s; same shape."""
         return length / self.look_ahead
-
-    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
-        """Return acceptance radii, m: 0, ArduPlane's own; the shape of `turn`."""
-        return np.zeros_like(turn)
-
-
-@dataclass(frozen=True, slots=True)
-class ArduPlane(ArduPlaneLimits):
-    """How ArduPlane flies plain waypoints in AUTO, in a steady wind.
-
-    After ArduPilot's documentation (Plane: navigation tuning, parameter list), with constants from
-    flights of its simulator: lateral guidance `NAVL1` within the roll limit, airspeed and height by
-    total energy control. A waypoint is reached within its acceptance radius or on passing the
-    perpendicular through it. Where the waypoint gives no radius it is the least of WP_RADIUS, over
-    the density's ratio, and the guidance's look-ahead, for turns below 90 degrees in proportion to
-    the turn. Commanded speeds are equivalent airspeeds. ArduPlane has no hold at a plain waypoint,
-    so `FlightPath.holds` do not count. Limits are SI, angles radians.
-    """
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.

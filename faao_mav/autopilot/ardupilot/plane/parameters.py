@@ -10,8 +10,8 @@ from math import pi, radians
 from faao_mav.autopilot.ardupilot import SHARED, rally_parameters, switch
 from faao_mav.autopilot.atmosphere import density_ratio
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody
-from faao_mav.autopilot.parameter import Parameter, ParameterRecord, parameter, table
-from faao_mav.autopilot.vehicle_type import SpeedRates
+from faao_mav.autopilot.model import Model, SpeedRates, parameter
+from faao_mav.autopilot.parameter import Parameter, table
 from faao_mav.power import GRAVITY
 
 _TURN = 1.2
@@ -23,7 +23,7 @@ were flown 17 and 38 m rms from them; planned with 1.2 over ground these were 5.
 
 
 @dataclass(frozen=True, slots=True)
-class ArduPlaneLimits(ParameterRecord):
+class ArduPlaneLimits(Model):
     """What bounds a flight of ArduPlane, in SI units.
 
     `descent_speed` is the sink rate with an idling engine; `body` is the aircraft.
