@@ -1,4 +1,4 @@
-"""Items that are flown in circles, and where a return goes when there are rally points."""
+"""Where items are: their heights, circles, and where a return goes when there are rally points."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,8 +9,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.parameter import ParameterValues
-from faao_mav.mission.command import Command
-from faao_mav.mission.item import MissionItem
+from faao_mav.mission.command import ABOVE_SEA, Command, Frame
+from faao_mav.mission.item import Mission, MissionItem
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,9 @@ class Orbit:
         wide = self.radius / math.cos(np.pi / corners)
         return center + wide * np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
+
+CIRCLING = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
+"""How a vehicle goes on that circles where its mission or its return ends."""
 
 Orbits: TypeAlias = Callable[[ParameterValues, MissionItem], Orbit | None]
 """How a vehicle circles at an item, None where it does not."""
@@ -112,3 +115,13 @@ class RallyRule:
         nearest = int(np.argmin(away))
         nearer_home = self.home and float(np.hypot(*(home - here))) <= away[nearest]
         return None if away[nearest] > self.limit or nearer_home else nearest
+
+
+def height_above_home(item: MissionItem, mission: Mission) -> float:
+    """Return the height of `item` above home, m; NaN where that needs home's and it is not told.
+
+    Heights above terrain count as if the ground were as high as home.
+    """
+    if item.frame not in ABOVE_SEA and item.frame != Frame.MISSION:
+        return item.z
+    return item.z - mission.home.altitude if mission.home is not None else math.nan

@@ -13,11 +13,11 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.flight_path import LONGEST, FlightPath, Track
-from faao_mav.autopilot.orbit import Orbit
+from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.autopilot.vehicle import Vehicle
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import ABOVE_SEA, FLOWN_TO, Command, Frame
+from faao_mav.mission.command import FLOWN_TO, Command
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.mission.jumps import JUMPS, jump_target
 from faao_mav.vector import Vector
@@ -36,8 +36,8 @@ _REPEATS = 20
 _SAME_PLACE = 0.01
 """The distance, m, below which two places are one."""
 
-_CIRCLING = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
-"""How a vehicle that does not land on its return goes on."""
+_HOLDING = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+"""Commands whose param1 is how long, s, what hovers waits."""
 
 _SHORTEST = 1e-3
 """The shortest motion, s, that is worth a sample."""
@@ -63,29 +63,19 @@ def predict(
     without a home), parameters that are useless, or a flight that takes more than
     1.5 hours, of a plane six.
     """
-    start = _start(mission)
-    if start is None:
-        empty = np.empty((0, 3))
-        reached = np.full(len(mission.items), np.nan)
-        none = np.empty(0, dtype=int)
-        return Track(np.empty(0), empty, empty, none, reached, frame or LocalFrame(0.0, 0.0))
-    frame = frame or LocalFrame(*start)
-    walk = _Walk(mission, vehicle, frame, step, np.append(frame.to_local(*start), 0.0), wind)
+    home, start = mission.home, mission.first_place or (0.0, 0.0)
+    if home is not None:
+        start = home.latitude, home.longitude
+    if not any(item.command in FLOWN_TO for item in mission.items):
+        empty, reached = np.empty((0, 3)), np.full(len(mission.items), np.nan)
+        none, frame = np.empty(0, dtype=int), frame or LocalFrame(0.0, 0.0)
+        return Track(np.empty(0), empty, empty, none, reached, frame)
+    walk = _Walk(mission, vehicle, frame or LocalFrame(*start), step, start, wind)
     for index, item in _in_order(mission):
         walk.take(index, item)
         if walk.over:
             break
-    walk.fly()
     return walk.track()
-
-
-def _start(mission: Mission) -> tuple[float, float] | None:
-    """Return where the flight begins, degrees; None if the mission has no places at all."""
-    if not any(item.command in FLOWN_TO for item in mission.items):
-        return None
-    if mission.home is not None:
-        return mission.home.latitude, mission.home.longitude
-    return mission.first_place or (0.0, 0.0)
 
 
 def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
@@ -128,78 +118,72 @@ class _Stop:
     waits: list[int] = field(default_factory=list)
 
 
-@dataclass
 class _Walk:
     """The flight so far, and the stretch still to be flown in one go from where it rests."""
 
-    mission: Mission
-    vehicle: Vehicle
-    frame: LocalFrame
-    step: float
-    home: Real
-    wind: Vector
-    stretch: list[_Stop] = field(default_factory=list)
-    parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
-    clock: float = 0.0
-    over: bool = False
-
-    def __post_init__(self) -> None:
-        self.vertical = self.vehicle.vertical
-        self.flying = self.vehicle
-        self.model = self.vehicle.flight_model(self.frame.latitude)
-        self.speed = self.model.cruise_speed
-        self.place = self.goal = self.home
-        self.reached = np.full(len(self.mission.items), np.nan)
-        self.longest = LONGEST_COPTER if self.vehicle.type.hovers else LONGEST
-        home = self.mission.home
-        self._elevation = 0.0 if home is None or math.isnan(home.altitude) else home.altitude
+    def __init__(
+        self,
+        mission: Mission,
+        vehicle: Vehicle,
+        frame: LocalFrame,
+        step: float,
+        start: tuple[float, float],
+        wind: Vector,
+    ) -> None:
+        self._mission, self._vehicle, self._frame = mission, vehicle, frame
+        self._step, self._wind = step, wind
+        self._type, self._vertical = vehicle.type, vehicle.vertical
+        self._model = vehicle.flight_model(frame.latitude)
+        self._speed = self._model.cruise_speed
+        self._longest = LONGEST_COPTER if self._type.hovers else LONGEST
+        self._home = self._place = np.append(frame.to_local(*start), 0.0)
+        self._stretch: list[_Stop] = []
+        self._parts: list[tuple[Real, Real, Real, Real]] = []
+        self._clock, self.over = 0.0, False
+        self._reached = np.full(len(mission.items), np.nan)
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
-        hold = item.params[0] if math.isfinite(item.params[0]) else 0.0
-        orbit = self.vehicle.type.orbits(self.vehicle, self.vehicle.type.dialect.sent(item))
+        number, hovers = item.params[0] if item.params[0] > 0 else 0.0, self._type.hovers
         match item.command:
-            case _ if orbit is not None:
+            case _ if (orbit := self._vehicle.orbit(item)) is not None:
                 self._circle(index, self._spot(index, item), orbit)
             case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
                 self._take_off(index, item)
-            case Command.NAV_WAYPOINT | Command.NAV_SPLINE_WAYPOINT:
-                self._waypoint(index, item, max(hold, 0.0) if self.vehicle.type.hovers else 0.0)
-            case Command.NAV_LOITER_TIME:
-                self._waypoint(index, item, max(hold, 0.0))
-            case Command.NAV_LOITER_UNLIM:
-                self._waypoint(index, item, 0.0)
-                self.over = True
             case Command.NAV_LAND | Command.NAV_VTOL_LAND:
                 self._land(index, item)
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
-            case Command.NAV_DELAY if self.vehicle.type.hovers:
-                self._delay(index, max(hold, 0.0))
+            case Command.NAV_DELAY if hovers and math.isfinite(number):
+                self._delay(index, number)
             case Command.DO_CHANGE_SPEED:
                 self._change_speed(item)
             case command if command in FLOWN_TO:
-                self._waypoint(index, item, 0.0)
+                goal, radius = self._spot(index, item), item.params[1]
+                hold = number if hovers and command in _HOLDING and number < math.inf else 0.0
+                own = command == Command.NAV_WAYPOINT and 0 < radius < math.inf
+                spline = command == Command.NAV_SPLINE_WAYPOINT
+                self._towards(index, goal, hold, spline=spline, radius=radius if own else 0.0)
+                self.over = command == Command.NAV_LOITER_UNLIM
 
     def track(self) -> Track:
         """Return everything flown."""
-        if not self.parts:  # one sample, at rest
-            at_rest = (np.array([self.clock]), self.place[None], np.zeros((1, 3)), np.zeros(1))
-            self.parts.append(at_rest)
-        t, position, velocity, item = (
-            np.concatenate(part) for part in zip(*self.parts, strict=True)
-        )
-        return Track(t, position, velocity, item.astype(int), self.reached, self.frame)
+        self._fly()
+        if not self._parts:  # one sample, at rest
+            at_rest = (np.array([self._clock]), self._place[None], np.zeros((1, 3)), np.zeros(1))
+            self._parts.append(at_rest)
+        t, position, velocity, item = map(np.concatenate, zip(*self._parts, strict=True))
+        return Track(t, position, velocity, item.astype(int), self._reached, self._frame)
 
-    def fly(self) -> None:
+    def _fly(self) -> None:
         """Fly the waypoints that are waiting."""
-        stops, self.stretch = self.stretch, []
-        if not stops:
-            return
+        stops, self._stretch = self._stretch, []
         if len(stops) == 1:
-            self._go(stops[0].item, self.place, stops[0].delay)
-            self.reached[stops[0].waits] = self.clock
+            self._go(stops[0].item, self._place, stops[0].delay)
+            self._reached[stops[0].waits] = self._clock
+        if len(stops) < 2:
             return
+        home = self._mission.home
         path = FlightPath(
             points=np.array([stop.point for stop in stops]),
             speeds=np.array([stop.speed for stop in stops[1:]]),
@@ -207,94 +191,56 @@ class _Walk:
             splines=np.array([stop.spline for stop in stops]),
             radii=np.array([stop.radius for stop in stops]),
             delays=np.array([stop.delay for stop in stops]),
-            longest=self.longest - self.clock,
-            elevation=self._elevation,
-            wind=self.wind,
-            entry=None if self.vehicle.type.hovers or not self.parts else self.parts[-1][2][-1],
+            longest=self._longest - self._clock,
+            elevation=0.0 if home is None or math.isnan(home.altitude) else home.altitude,
+            wind=self._wind,
+            entry=None if self._type.hovers or not self._parts else self._parts[-1][2][-1],
         )
         self._check_clock(self._at_least(path))
-        flown = self.model.fly(path, self.step)
+        flown = self._model.fly(path, self._step)
         end = float(flown.departures[-1])
         kept = flown.t <= end
         leg = np.searchsorted(flown.departures[1:], flown.t[kept], side="right")
         items = np.array([stop.item for stop in stops[1:]])[np.minimum(leg, len(stops) - 2)]
-        self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], items)
+        place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
         for stop, done in zip(stops, flown.departures, strict=True):
             own = [] if stop is stops[0] else [stop.item]
-            self.reached[own + stop.waits] = self.clock + done
-        self.clock += end
-        self.place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
-        self.goal = path.points[-1]
+            self._reached[own + stop.waits] = self._clock + done
+        self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], items)
+        self._clock, self._place = self._clock + end, place
 
     def _at_least(self, path: FlightPath) -> float:
         """Return how long `path` takes without ramps, s."""
         ways = np.diff(path.points, axis=0)
-        speeds = np.where(path.speeds > 0, path.speeds, self.model.cruise_speed)
+        speeds = np.where(path.speeds > 0, path.speeds, self._model.cruise_speed)
         level, rise = np.hypot(ways[:, 0], ways[:, 1]) / speeds, ways[:, 2]
-        limit = np.where(rise > 0, self.vertical.climb_speed, self.vertical.descent_speed)
+        limit = np.where(rise > 0, self._vertical.climb_speed, self._vertical.descent_speed)
         legs = np.maximum(level, np.abs(rise) / limit)
         return float(legs.sum() + np.sum(path.holds + path.delays))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
-        self.fly()
-        here = self.vehicle.type.dialect.zero_means_here and not (item.x or item.y)
-        unset = math.isnan(item.x) or math.isnan(item.y)
-        goal = self._height_over(self.place, item, index)
-        if not (here or unset):
+        self._fly()
+        here = self._type.dialect.zero_means_here and not (item.x or item.y)
+        if here or math.isnan(item.x) or math.isnan(item.y):
+            goal = np.array([*self._place[:2], self._height(index, item)])
+        else:
             goal = self._spot(index, item)
-        if self.vehicle.type.hovers:
-            climb = np.array([self.place[0], self.place[1], goal[2]])
-            self._go(index, climb, self.vertical.take_off(float(goal[2] - self.place[2])))
-        if np.hypot(*(goal - self.place)[:2]) > _SAME_PLACE or not self.vehicle.type.hovers:
-            self._towards(index, goal, 0.0)
-            self.fly()
-        self.reached[index] = self.clock
-
-    def _waypoint(self, index: int, item: MissionItem, hold: float) -> None:
-        radius = item.params[1] if item.command == Command.NAV_WAYPOINT else 0.0
-        spline = item.command == Command.NAV_SPLINE_WAYPOINT
-        radius = radius if math.isfinite(radius) and radius > 0 else 0.0
-        self._towards(index, self._spot(index, item), hold, spline=spline, radius=radius)
+        if self._type.hovers:
+            climb = np.array([*self._place[:2], goal[2]])
+            self._go(index, climb, self._vertical.take_off(float(goal[2] - self._place[2])))
+        if np.hypot(*(goal - self._place)[:2]) > _SAME_PLACE or not self._type.hovers:
+            self._towards(index, goal)
+            self._fly()
+        self._reached[index] = self._clock
 
     def _towards(
-        self, index: int, goal: Real, hold: float, *, spline: bool = False, radius: float = 0.0
+        self, index: int, goal: Real, hold: float = 0.0, *, spline: bool = False, radius: float = 0
     ) -> None:
-        last = self._last_stop(index)
-        if np.abs(goal - last.point).max() <= _SAME_PLACE:
-            self._delay(index, math.floor(hold) if self.vehicle.type.whole_second_holds else hold)
+        if np.abs(goal - self._last_stop(index).point).max() <= _SAME_PLACE:
+            self._delay(index, math.floor(hold) if self._type.whole_second_holds else hold)
         else:
-            stop = _Stop(goal, index, self.speed, hold, spline=spline, radius=radius)
-            self.stretch.append(stop)
-
-    def _circle(self, index: int, center: Real, orbit: Orbit) -> None:
-        """Fly to the nearest place of a circle about `center` (3,), then round it.
-
-        Speeds on it are those in calm air.
-        """
-        here = self.stretch[-1].point if self.stretch else self.place
-        edge = orbit.edge(center[:2], here[:2])
-        self._towards(index, np.array([*edge, here[2] if orbit.climbs else center[2]]), 0.0)
-        self.fly()
-        rise, speed = float(center[2] - self.place[2]), orbit.speed(self.speed)
-        rate = self.vertical.climb_speed if rise > 0 else self.vertical.descent_speed
-        lasting = orbit.lasting(self.speed, abs(rise) / rate)
-        if lasting >= _SHORTEST:
-            self._check_clock(lasting)
-            t = np.linspace(0.0, lasting, max(2, math.ceil(lasting / self.step) + 1))
-            sense = -1.0 if orbit.clockwise else 1.0  # angles count from east to north
-            angle = math.atan2(*(edge - center[:2])[::-1]) + sense * speed / orbit.radius * t
-            out = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            along = sense * speed * np.stack([-out[:, 1], out[:, 0]], axis=1)
-            up = self.place[2] + np.clip(np.sign(rise) * rate * t, min(rise, 0), max(rise, 0))
-            climbing = np.where(t < abs(rise) / rate, np.sign(rise) * rate, 0.0)
-            position = np.column_stack([center[:2] + orbit.radius * out, up])
-            if self.vehicle.type.hovers:
-                along[[0, -1]] = 0.0
-            self._add(t, position, np.column_stack([along, climbing]), np.full(len(t), index))
-            self.clock += lasting
-            self.place = self.goal = position[-1]
-        self.reached[index] = self.clock
-        self.over = self.over or orbit.endless
+            stop = _Stop(goal, index, self._speed, hold, spline=spline, radius=radius)
+            self._stretch.append(stop)
 
     def _delay(self, index: int, seconds: float) -> None:
         last = self._last_stop(index)
@@ -303,76 +249,99 @@ class _Walk:
 
     def _last_stop(self, index: int) -> _Stop:
         """Return where the stretch ends so far; it begins with item `index` where there is none."""
-        self.stretch = self.stretch or [_Stop(self.place, index)]
-        return self.stretch[-1]
+        self._stretch = self._stretch or [_Stop(self._place, index)]
+        return self._stretch[-1]
+
+    def _circle(self, index: int, center: Real, orbit: Orbit) -> None:
+        """Fly to the nearest place of a circle about `center` (3,), then round it.
+
+        Speeds on it are those in calm air.
+        """
+        here = self._last_stop(index).point
+        edge = orbit.edge(center[:2], here[:2])
+        self._towards(index, np.array([*edge, here[2] if orbit.climbs else center[2]]))
+        self._fly()
+        rise, speed = float(center[2] - self._place[2]), orbit.speed(self._speed)
+        rate = self._vertical.climb_speed if rise > 0 else self._vertical.descent_speed
+        lasting = orbit.lasting(self._speed, abs(rise) / rate)
+        if lasting >= _SHORTEST:
+            t = self._times(lasting)
+            sense = -1.0 if orbit.clockwise else 1.0  # angles count from east to north
+            angle = math.atan2(*(edge - center[:2])[::-1]) + sense * speed / orbit.radius * t
+            out = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+            along = sense * speed * np.stack([-out[:, 1], out[:, 0]], axis=1)
+            up = self._place[2] + np.clip(np.sign(rise) * rate * t, min(rise, 0), max(rise, 0))
+            climbing = np.where(t < abs(rise) / rate, np.sign(rise) * rate, 0.0)
+            position = np.column_stack([center[:2] + orbit.radius * out, up])
+            if self._type.hovers:
+                along[[0, -1]] = 0.0
+            self._add(t, position, np.column_stack([along, climbing]), np.full(len(t), index))
+            self._clock, self._place = self._clock + lasting, position[-1]
+        self._reached[index] = self._clock
+        self.over = self.over or orbit.endless
 
     def _land(self, index: int, item: MissionItem) -> None:
-        here = self.stretch[-1].point if self.stretch else self.place
-        goal = self._height_over(here, item, index)
+        here = self._last_stop(index).point
+        self._height(index, item)
+        ground = here[:2]
         if (item.x or item.y) and not (math.isnan(item.x) or math.isnan(item.y)):
-            goal[:2] = self.frame.to_local(item.x, item.y)
-        self._towards(index, np.array([goal[0], goal[1], here[2]]), 0.0)
-        self._descend(index)
+            ground = self._frame.to_local(item.x, item.y)
+        self._towards(index, np.array([*ground, here[2]]))
+        self._descend(index, ground)
 
     def _return(self, index: int) -> None:
-        self.fly()
-        rally = [self.frame.to_local(p.latitude, p.longitude) for p in self.mission.rally]
-        chosen = self.vehicle.type.rally(self.vehicle).chosen(self.place[:2], self.home[:2], rally)
-        goal = self.home[:2] if chosen is None else rally[chosen]
-        level = self.vertical.returns_at(float(self.place[2]))
-        if chosen is not None and not math.isnan(height := self.mission.rally[chosen].altitude):
-            level = max(level, height) if self.vertical.lands_on_return else height
-        if self.vehicle.type.hovers and level > self.place[2] + _SAME_PLACE:
-            up = np.array([self.place[0], self.place[1], level])
-            self._go(index, up, self.vertical.climb(level - float(self.place[2])))
-        self.speed = self.model.cruise_speed
-        place = np.array([goal[0], goal[1], level])
-        orbit = self.vehicle.type.orbits(self.vehicle, _CIRCLING)
-        if orbit is not None and not self.vertical.lands_on_return:
+        self._fly()
+        place = self._vehicle.returns_to(self._mission, self._frame, self._place, self._home)
+        rise = float(place[2] - self._place[2])
+        if self._type.hovers and rise > _SAME_PLACE:
+            up = np.array([*self._place[:2], place[2]])
+            self._go(index, up, self._vertical.climb(rise))
+        self._speed = self._model.cruise_speed
+        orbit = self._vehicle.orbit(CIRCLING)
+        if orbit is not None and not self._vertical.lands_on_return:
             self._circle(index, place, orbit)
-            return
-        self._towards(index, place, 0.0)
-        self._descend(index)
+        else:
+            self._towards(index, place)
+            self._descend(index, place[:2])
 
-    def _descend(self, index: int) -> None:
-        self.fly()
-        ground = np.array([self.goal[0], self.goal[1], 0.0])
-        self._go(index, ground, self.vertical.descend(float(self.place[2])))
-        self.reached[index] = self.clock
+    def _descend(self, index: int, ground: Real) -> None:
+        self._fly()
+        self._go(index, np.append(ground, 0.0), self._vertical.descend(float(self._place[2])))
+        self._reached[index] = self._clock
         self.over = True
 
     def _go(self, index: int, goal: Real, lasting: float) -> None:
         """Move to `goal` at constant speed in `lasting` seconds."""
-        if lasting < _SHORTEST:
-            return
+        if lasting >= _SHORTEST:
+            t = self._times(lasting)
+            velocity = np.tile((goal - self._place) / lasting, (len(t), 1))
+            position = self._place + t[:, None] * velocity
+            velocity[[0, -1]] = 0.0
+            self._add(t, position, velocity, np.full(len(t), index))
+            self._clock, self._place = self._clock + lasting, goal
+
+    def _times(self, lasting: float) -> Real:
+        """Return when to take samples of what goes on for `lasting` seconds, s."""
         self._check_clock(lasting)
-        t = np.linspace(0.0, lasting, max(2, math.ceil(lasting / self.step) + 1))
-        way = (goal - self.place) / lasting
-        position = self.place + t[:, None] * way
-        velocity = np.tile(way, (len(t), 1))
-        velocity[[0, -1]] = 0.0
-        self._add(t, position, velocity, np.full(len(t), index))
-        self.clock += lasting
-        self.place = self.goal = goal
+        return np.linspace(0.0, lasting, max(2, math.ceil(lasting / self._step) + 1))
 
     def _add(self, t: Real, position: Real, velocity: Real, item: Real) -> None:
-        first = 1 if self.parts else 0  # the instant that the last part ended with
+        first = 1 if self._parts else 0  # the instant that the last part ended with
         if len(t) > first:
-            self.parts.append(
-                (t[first:] + self.clock, position[first:], velocity[first:], item[first:])
-            )
+            part = (t + self._clock, position, velocity, item)
+            self._parts.append((part[0][first:], position[first:], velocity[first:], item[first:]))
 
     def _change_speed(self, item: MissionItem) -> None:
-        change = self.vehicle.type.dialect.speed_change(item)
+        change = self._type.dialect.speed_change(item)
         if change is None:
             return
         if change.axis in ("climb", "descent"):
             if change.speed is not None:
-                self.fly()
-                self.flying = self.flying.having(f"{change.axis}_speed", change.speed)
-                self.model = self.flying.flight_model(self.frame.latitude)
+                self._fly()
+                self._vehicle = self._vehicle.having(f"{change.axis}_speed", change.speed)
+                self._model = self._vehicle.flight_model(self._frame.latitude)
         else:
-            self.speed = self.model.cruise_speed if change.speed is None else change.speed
+            self._speed = self._model.cruise_speed if change.speed is None else change.speed
 
     def _spot(self, index: int, item: MissionItem) -> Real:
         """Return the place of `item`, (3,) m."""
@@ -381,26 +350,23 @@ class _Walk:
                 f"mission item {index + 1}: {item.x}, {item.y} is no place to fly to; "
                 "expected degrees"
             )
-        return self._height_over(np.append(self.frame.to_local(item.x, item.y), 0.0), item, index)
+        return np.append(self._frame.to_local(item.x, item.y), self._height(index, item))
 
-    def _height_over(self, place: Real, item: MissionItem, index: int) -> Real:
-        """Return `place` at the height of `item` above home."""
+    def _height(self, index: int, item: MissionItem) -> float:
+        """Return the height of `item` above home, m."""
         if not math.isfinite(item.z):
             raise InputError(f"mission item {index + 1}: altitude {item.z}; expected metres")
-        height = item.z
-        if item.frame in {int(frame) for frame in ABOVE_SEA | {Frame.MISSION}}:
-            home = self.mission.home
-            if home is None or math.isnan(home.altitude):
-                raise InputError(
-                    f"mission item {index + 1}: an altitude above sea level needs that of the "
-                    "mission's home, which the file does not have"
-                )
-            height -= home.altitude
-        return np.array([place[0], place[1], height])
+        height = height_above_home(item, self._mission)
+        if math.isnan(height):
+            raise InputError(
+                f"mission item {index + 1}: an altitude above sea level needs that of the "
+                "mission's home, which the file does not have"
+            )
+        return height
 
     def _check_clock(self, lasting: float) -> None:
-        if not self.clock + lasting <= self.longest:
+        if not self._clock + lasting <= self._longest:
             raise InputError(
-                f"the flight would take more than {self.longest / 3600:g} h and is not followed "
+                f"the flight would take more than {self._longest / 3600:g} h and is not followed "
                 "that far"
             )

@@ -7,9 +7,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body, CopterBody
 from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.model import Model
+from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.vehicle_type import (
     Autopilot,
     AutopilotFamily,
@@ -18,6 +22,8 @@ from faao_mav.autopilot.vehicle_type import (
     lean_acceleration,
 )
 from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.item import Mission, MissionItem
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
 """The vehicle types that are known, by the names of autopilot and type."""
@@ -132,6 +138,26 @@ class Vehicle:
     def vertical(self) -> VerticalProfile:
         """How it takes off, climbs, returns and lands."""
         return self.type.vertical(self)
+
+    def orbit(self, item: MissionItem) -> Orbit | None:
+        """Return how it circles at `item`, None where it does not."""
+        return self.type.orbits(self, self.type.dialect.sent(item))
+
+    def returns_to(self, mission: Mission, frame: LocalFrame, here: Real, home: Real) -> Real:
+        """Return where and how high a return from `here` (3,), m in `frame`, goes, (3,).
+
+        It goes to `home` (2 or more,), or to one of the mission's rally points, before it lands or
+        circles there.
+        """
+        rally = [frame.to_local(point.latitude, point.longitude) for point in mission.rally]
+        chosen = self.type.rally(self).chosen(here[:2], home[:2], rally)
+        level = self.vertical.returns_at(float(here[2]))
+        if chosen is None:
+            return np.array([*home[:2], level])
+        height = mission.rally[chosen].altitude
+        if not math.isnan(height):
+            level = max(level, height) if self.vertical.lands_on_return else height
+        return np.array([*rally[chosen], level])
 
     def flight_model(self, latitude: float | None = None) -> Model:
         """Return how it flies at `latitude`, degrees.

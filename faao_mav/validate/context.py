@@ -11,7 +11,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.autopilot.dialect import SpeedChange, name_of
-from faao_mav.autopilot.orbit import Orbit
+from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
@@ -147,18 +147,13 @@ class ValidationContext:
 
     def height(self, item: MissionItem) -> float:
         """Return metres above home to `item`, NaN where nothing tells them."""
-        if item.frame in ABOVE_HOME:
-            return item.z
-        above_sea = item.frame in ABOVE_SEA or item.frame == Frame.MISSION
-        home = self.mission.home
-        return item.z - home.altitude if above_sea and home is not None else math.nan
+        told = item.frame in ABOVE_HOME | ABOVE_SEA or item.frame == Frame.MISSION
+        return height_above_home(item, self.mission) if told else math.nan
 
     @cached_property
     def orbits(self) -> dict[int, Orbit]:
         """How the vehicle circles, by the index of the item."""
-        own, placed = self.vehicle.type, self.each(*FLOWN_TO)
-        sent = ((k, own.dialect.sent(item)) for k, item in placed if fits_message(item))
-        found = ((k, own.orbits(self.vehicle, item)) for k, item in sent)
+        found = ((k, self.vehicle.orbit(item)) for k, item in self.each(*FLOWN_TO))
         return {k: orbit for k, orbit in found if orbit is not None}
 
     @cached_property
@@ -169,8 +164,7 @@ class ValidationContext:
         """
         placed = (place for place in self.places if place.index in self.orbits)
         circles = {place.index: self.orbits[place.index].outline(place.ground) for place in placed}
-        unlimited = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL)
-        waiting = self.vehicle.type.orbits(self.vehicle, unlimited)
+        waiting = self.vehicle.orbit(CIRCLING)
         for last in self.legs[-1:] if waiting is not None else ():
             returns = self.items[last.index].command == Command.NAV_RETURN_TO_LAUNCH
             ends = self.items[last.index].command in LANDINGS or last.jump
@@ -218,10 +212,9 @@ class ValidationContext:
     def _returns_to(self, here: PlacedItem, home: PlacedItem) -> PlacedItem:
         """Return where a return from `here` ends, at a height that nothing tells."""
         assert self.frame is not None
-        rally = [self.frame.to_local(p.latitude, p.longitude) for p in self.mission.rally]
-        chosen = self.vehicle.type.rally(self.vehicle).chosen(here.ground, home.ground, rally)
-        east, north = (home.ground if chosen is None else rally[chosen]).tolist()
-        return PlacedItem(HOME, east, north, math.nan)
+        start = np.append(here.ground, here.up)
+        east, north, _ = self.vehicle.returns_to(self.mission, self.frame, start, home.ground)
+        return PlacedItem(HOME, float(east), float(north), math.nan)
 
     @cached_property
     def track_positions(self) -> Real | None:
