@@ -15,7 +15,6 @@ from faao_mav.validate.flown import FlightRecord
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle
-from faao_mav.wire.machine import Script
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.transfer.verify import Difference
 from faao_mav.wire.wire_items import wire_items
@@ -67,7 +66,7 @@ def fly(
         # A vehicle that flies already is not judged, and not kept busy.
         judged = arm or flight.streamed or not vehicle.armed
         asked = tuple(part for part in MissionType if judged or lists[part])
-        held = session.run(Script(read_held(peer, asked, parameters=judged)))
+        held = session.run(read_held(peer, asked, parameters=judged))
         for part, outcome in held.missing.items():
             if lists[part]:
                 raise LinkError(f"{connection}: {session.not_read(part, outcome)}")

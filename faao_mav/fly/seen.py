@@ -1,17 +1,18 @@
 """What is to be flown, and what a vehicle holds before: what the gate compares."""
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from faao_mav.autopilot import Vehicle, VehicleType
 from faao_mav.autopilot.files import MadeFor
 from faao_mav.errors import InputError
 from faao_mav.mission.item import Home, Mission
-from faao_mav.wire.machine import Machine, ask_for
+from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import HomePosition, WireItem
-from faao_mav.wire.parameters import Reading, ReadParameters
+from faao_mav.wire.parameters import Reading, read_parameters
 from faao_mav.wire.protocol import HOME_POSITION, MissionType
+from faao_mav.wire.questions import ask_for
 from faao_mav.wire.transfer.exchange import Outcome, Peer
 from faao_mav.wire.transfer.session import download_lists
 from faao_mav.wire.transfer.verify import Difference, compare
@@ -61,7 +62,7 @@ def read_held(
     parts: Sequence[MissionType] = tuple(MissionType),
     *,
     parameters: bool = True,
-) -> Generator[Machine[Any], Any, "Held"]:
+) -> Talk["Held"]:
     """Read what the vehicle of `peer`, which has to be one that is known, holds.
 
     That are the lists `parts`, and with `parameters` these and its home.
@@ -75,10 +76,10 @@ def read_held(
     names += [(name,) for each in vehicle.failsafes for name in each.defaults]
     if vehicle.modes.guided is not None:
         names += [(name,) for name in vehicle.family.setpoints.defaults]
-    reading: Reading = yield ReadParameters(peer, tuple(dict.fromkeys(names)))
-    told: list[HomePosition] = yield ask_for(peer.address, HOME_POSITION, HomePosition)
+    reading = yield from read_parameters(peer, names)
+    told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
     try:
-        home = home_in(told[0]) if told else None
+        home = None if told is None else home_in(told)
     except InputError:
         home = None
     return Held(lists.items, reading, lists.missing, home)

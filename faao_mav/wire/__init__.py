@@ -6,5 +6,5 @@ from faao_mav.wire.client import clear as clear
 from faao_mav.wire.client import download as download
 from faao_mav.wire.client import upload as upload
 from faao_mav.wire.protocol import MissionType as MissionType
-from faao_mav.wire.transfer.pace import Timeouts as Timeouts
+from faao_mav.wire.questions import Timeouts as Timeouts
 from faao_mav.wire.transfer.verify import Difference as Difference

@@ -3,10 +3,10 @@
 import secrets
 import time
 import warnings
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeAlias, TypedDict, TypeVar, Unpack
+from typing import TypedDict, TypeVar, Unpack
 
 from faao_mav.autopilot import families
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
@@ -14,7 +14,7 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import SETTLE, Discovery, FoundVehicle, choose
 from faao_mav.wire.link import Observe, WireLink
-from faao_mav.wire.machine import Machine, Script, ask_alive, ask_for
+from faao_mav.wire.machine import Script, Talk
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition
 from faao_mav.wire.parameters import Change, check_settable, set_parameters
 from faao_mav.wire.protocol import (
@@ -25,11 +25,12 @@ from faao_mav.wire.protocol import (
     MissionType,
     meaning,
 )
+from faao_mav.wire.questions import Timeouts, ask_alive, ask_for
 from faao_mav.wire.signing import Verdict, read_signing, remember
 from faao_mav.wire.transfer.exchange import Outcome, Peer
-from faao_mav.wire.transfer.pace import Timeouts
 from faao_mav.wire.transfer.session import (
     ABSENT,
+    Lists,
     PartReport,
     clear_lists,
     download_lists,
@@ -39,7 +40,7 @@ from faao_mav.wire.transfer.session import (
 )
 from faao_mav.wire.transport import parse_connection
 from faao_mav.wire.whereabouts import Whereabouts, home_in, place_in
-from faao_mav.wire.wire_items import mission_of, wire_items
+from faao_mav.wire.wire_items import home_items, mission_of, wire_items
 
 T = TypeVar("T")
 
@@ -101,10 +102,6 @@ class UploadReport:
         return not self.problems
 
 
-Work: TypeAlias = Generator[Machine[Any], Any, UploadReport]
-"""What changes a vehicle, for a `Script`; its report has no seconds and problems of lists yet."""
-
-
 def upload(
     mission: Mission,
     connection: str,
@@ -130,15 +127,15 @@ def upload(
         raise InputError("upload: the mission has no items; clear the vehicle's instead")
     check_settable(parameters or (), "parameters")
 
-    def job(session: Session) -> Work:
+    def job(session: Session) -> Talk[UploadReport]:
         peer = session.peer
         if made_for is not None and peer.vehicle is not None:
             mistake = addressee_mistake(made_for, peer.vehicle)
             if mistake is not None:
                 raise LinkError(f"{connection}: {mistake}: nothing is uploaded")
         lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
-        told: list[GlobalPositionInt] = yield ask_for(peer.address, POSITION, GlobalPositionInt)
-        place = place_in(told[0]) if told else None
+        told = yield from ask_for(peer.address, POSITION, GlobalPositionInt)
+        place = place_in(told) if told else None
         stands = None if place is None else Whereabouts.of(place, mission)
         changes, problem = yield from set_parameters(parameters or {}, peer)
         if problem:
@@ -166,7 +163,7 @@ def clear(
     Arguments and errors as in `upload`.
     """
 
-    def job(session: Session) -> Work:
+    def job(session: Session) -> Talk[UploadReport]:
         reports = yield from clear_lists(types, session.peer)
         return UploadReport(session.found, reports, 0.0, ())
 
@@ -177,7 +174,7 @@ def _change(
     connection: str,
     mission: Mission,
     allow_armed: bool,
-    job: "Callable[[Session], Work]",
+    job: "Callable[[Session], Talk[UploadReport]]",
     options: LinkOptions,
 ) -> UploadReport:
     """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
@@ -187,9 +184,9 @@ def _change(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
                 "disarm it, or allow it (--allow-armed)"
             )
-        session.peer = replace(session.peer, may_be_armed=allow_armed)
+        session.peer.may_be_armed = allow_armed
         try:
-            report = session.run(Script(job(session)))
+            report = session.run(job(session))
         except LinkError as error:
             raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
         problems = [*report.problems]
@@ -234,21 +231,29 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     """
     with Session(connection, options, knocks=True) as session:
         peer = session.peer
-        lists = session.run(Script(download_lists(tuple(MissionType), peer)))
+        lists, told = session.run(_all_held(peer))
         missing = {part: session.not_read(part, why) for part, why in lists.missing.items()}
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
         try:
             mission = mission_of(lists.items, peer.vehicle)
-            if mission.home is None:
-                told = session.run(ask_for(peer.address, HOME_POSITION, HomePosition))
-                mission = replace(mission, home=home_in(told[0]) if told else None)
+            if mission.home is None and told is not None:
+                mission = replace(mission, home=home_in(told))
         except InputError as error:
             raise LinkError(
                 f"{connection}: what the vehicle holds is no mission: {error}"
             ) from None
     mission = replace(mission, unread=tuple(part.title for part in missing))
     return Holdings(session.found, mission, tuple(missing.values()))
+
+
+def _all_held(peer: Peer) -> Talk[tuple[Lists, HomePosition | None]]:
+    """Read all lists, and the home that is not among them."""
+    lists = yield from download_lists(tuple(MissionType), peer)
+    flown = lists.items.get(MissionType.MISSION)
+    if flown is None or flown[: home_items(peer.vehicle, MissionType.MISSION)]:
+        return lists, None
+    return lists, (yield from ask_for(peer.address, HOME_POSITION, HomePosition))
 
 
 class Session:
@@ -307,7 +312,7 @@ class Session:
             boot=self._timeouts.boot,
             knocks=knocks and parse_connection(connection).kind == "serial",
         )
-        found = self.run(discovery)
+        found = self.link.run(discovery, self._observe)
         if self._signing is not None and not found:
             for verdict, text in _PASSED_OVER.items():
                 if verdict in self.link.heard:
@@ -349,6 +354,6 @@ class Session:
         family = self.found.family
         return f"; {family.only_one_station}" if family and family.only_one_station else ""
 
-    def run(self, machine: Machine[T]) -> T:
-        """Run `machine` to its end and return the outcome."""
-        return self.link.run(machine, self._observe)
+    def run(self, job: Talk[T]) -> T:
+        """Run `job` to its end and return the outcome."""
+        return self.link.run(Script(job), self._observe)

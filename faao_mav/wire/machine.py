@@ -1,14 +1,14 @@
-"""Machines: protocol logic without sockets, clocks or sleeping."""
+"""Machines and talks: protocol logic without sockets, clocks or sleeping."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
-from typing import Any, Generic, TypeAlias, TypeVar
+from dataclasses import dataclass, field
+from typing import Generic, TypeAlias, TypeVar
 
-from faao_mav.wire.messages import CommandLong, Envelope, Message, Timesync
-from faao_mav.wire.protocol import Address, MavCommand
+from faao_mav.wire.messages import Envelope, Message
 
 T = TypeVar("T")
-M = TypeVar("M", bound=Message)
 
 Progress: TypeAlias = tuple[str, int, int]
 """What is going on, how much of it is done, and of how much (0: not counted)."""
@@ -67,142 +67,82 @@ class Machine(ABC, Generic[T]):
         """Do what is due now."""
 
 
-_FIRST, _LONGEST = 0.25, 1.5
-"""Seconds after which a question is put again the first time, and at the latest: the guide's."""
+@dataclass(slots=True)
+class Line:
+    """What a talk knows of its link: the time, s, and what was `heard`, None when time has passed.
 
-
-class Ask(Machine[list[T]]):
-    """A machine that puts one question until it is answered, for `patience` seconds.
-
-    It is put again after a quarter of a second, and each time after twice as long, up to 1.5 s.
-    `answer` returns what an envelope says to it, None for nothing. The outcome is a list of that
-    answer, or empty; `what` is being done in words.
+    It tells its `progress`, and says messages, which are sent once it waits.
     """
 
-    def __init__(
-        self,
-        what: str,
-        question: Message,
-        answer: Callable[[Envelope], T | None],
-        patience: float = 3.0,
-    ) -> None:
-        super().__init__()
-        self._what, self._question, self._answer = what, question, answer
-        self._patience, self._wait, self._until = patience, _FIRST, 0.0
+    now: float = 0.0
+    heard: Envelope | None = None
+    progress: Progress = ("starting", 0, 0)
+    said: list[Message] = field(default_factory=list)
 
-    @property
-    def progress(self) -> Progress:
-        """Not counted."""
-        return self._what, 0, 0
-
-    def start(self, now: float) -> Sequence[Message]:
-        """Ask."""
-        self._until = now + self._patience
-        return self._ask(now)
-
-    def _ask(self, now: float) -> Sequence[Message]:
-        self._due = min(now + self._wait, self._until)
-        self._wait = min(2 * self._wait, _LONGEST)
-        return [self._question]
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:  # noqa: ARG002
-        answer = self._answer(envelope)
-        self.outcome = None if answer is None else [answer]
-        return ()
-
-    def _time_out(self, now: float) -> Sequence[Message]:
-        return self.cancel(now) if now >= self._until else self._ask(now)
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Do without an answer."""
-        self.outcome = []
-        return ()
+    def say(self, *messages: Message) -> None:
+        """Send `messages`."""
+        self.said += messages
 
 
-def ask_for(vehicle: Address, number: int, kind: type[M]) -> Ask[M]:
-    """Return a machine that asks `vehicle` for its message of the type `kind` and that `number`."""
+Talk: TypeAlias = Generator[float, Line, T]
+"""A conversation: it yields until when it waits, s, and is sent its line when something is heard or
+that time has come. What it returns is the outcome of a `Script`; closed, it may still say a word.
+"""
 
-    def answer(envelope: Envelope) -> M | None:
-        message = envelope.message
-        return message if envelope.sender == vehicle and isinstance(message, kind) else None
-
-    question = CommandLong(vehicle, MavCommand.REQUEST_MESSAGE, 0, float(number))
-    return Ask(f"asking for {kind.__name__}", question, answer)
-
-
-def ask_alive(vehicle: Address, number: int, patience: float = 9.0) -> Ask[Message]:
-    """Return a machine that asks for the answer to a `number` that nobody could know before.
-
-    One that reads MAVLink 1 alone does not give it. On a link that is signed a recording cannot,
-    and what was recorded before the answer is older than it: it is passed over from then on.
-
-    >>> vehicle = Address(1, 1)
-    >>> asking = ask_alive(vehicle, number=77)
-    >>> asking.start(now=0.0)
-    [Timesync(tc1=0, ts1=77)]
-    >>> asking.on(Envelope(vehicle, Timesync(123_456, 77)), now=0.1), bool(asking.outcome)
-    ((), True)
-    """
-
-    def answer(envelope: Envelope) -> Message | None:
-        match envelope.message:
-            case Timesync(tc1=tc1, ts1=ts1) as said if envelope.sender == vehicle:
-                return said if tc1 and ts1 == number else None
-        return None
-
-    return Ask("asking for a sign of life", Timesync(0, number), answer, patience)
+AT_ONCE = -math.inf
+"""What a talk yields that only wants its line."""
 
 
 class Script(Machine[T]):
-    """A machine made of machines: a generator yields one after the other and is sent its outcome.
+    """A machine that runs a talk, whose outcome is not None.
 
-    What the generator returns is the script's outcome.
+    >>> def knock():
+    ...     line = yield AT_ONCE
+    ...     line.say("knock")
+    ...     line = yield line.now + 2.0
+    ...     return "nobody" if line.heard is None else "somebody"
+    >>> script = Script(knock())
+    >>> script.start(1.0), script.deadline, script.tick(3.0), script.outcome
+    (['knock'], 3.0, [], 'nobody')
     """
 
-    def __init__(self, steps: Generator[Machine[Any], Any, T]) -> None:
+    def __init__(self, talk: Talk[T]) -> None:
         super().__init__()
-        self._steps = steps
-        self._step: Machine[Any] | None = None
-
-    @property
-    def deadline(self) -> float | None:
-        """When `tick` is due."""
-        return None if self._step is None else self._step.deadline
+        self._talk, self._line = talk, Line()
 
     @property
     def progress(self) -> Progress:
-        """What is going on in the present step."""
-        return ("starting", 0, 0) if self._step is None else self._step.progress
+        """What the talk tells."""
+        return self._line.progress
 
     def start(self, now: float) -> Sequence[Message]:
-        """Begin the first step."""
-        return self._advance(None, now)
+        """Begin the talk."""
+        return self._carry_on(lambda: next(self._talk), now)
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        return self._continue(lambda step: step.on(envelope, now), now)
+        self._line.heard = envelope
+        return self._carry_on(lambda: self._talk.send(self._line), now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
-        return self._continue(lambda step: step.tick(now), now)
+        return self._carry_on(lambda: self._talk.send(self._line), now)
 
-    def cancel(self, now: float) -> Sequence[Message]:
-        """Give up the present step, and with it the rest."""
-        return self._continue(lambda step: step.cancel(now), now)
+    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
+        """Close the talk: there is no outcome."""
+        self._due = math.inf
+        self._talk.close()
+        return self._sent()
 
-    def _continue(
-        self, told: Callable[[Machine[Any]], Sequence[Message]], now: float
-    ) -> Sequence[Message]:
-        """Return what the step sends when `told`, and what begins the next one if it ends."""
-        if self._step is None:
-            return ()
-        sent = told(self._step)
-        if self._step.outcome is None:
-            return sent
-        return [*sent, *self._advance(self._step.outcome, now)]
-
-    def _advance(self, outcome: Any, now: float) -> Sequence[Message]:
+    def _carry_on(self, step: Callable[[], float], now: float) -> Sequence[Message]:
+        self._line.now = now
         try:
-            self._step = self._steps.send(outcome)
+            self._due = step()
+            self._line.heard = None
+            while self._due == AT_ONCE:
+                self._due = self._talk.send(self._line)
         except StopIteration as end:
-            self._step, self.outcome = None, end.value
-            return ()
-        return self._continue(lambda step: step.start(now), now)
+            self.outcome = end.value
+        return self._sent()
+
+    def _sent(self) -> list[Message]:
+        said, self._line.said = self._line.said, []
+        return said

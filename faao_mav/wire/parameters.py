@@ -6,17 +6,17 @@ PX4 as their bits (its "byte-wise encoding").
 
 import math
 import struct
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from faao_mav.autopilot import VehicleType, vehicle_types
 from faao_mav.autopilot.parameter import Parameter
 from faao_mav.errors import InputError
-from faao_mav.wire.machine import Ask, Machine, Progress
-from faao_mav.wire.messages import Envelope, Message, ParamRequestRead, ParamSet, ParamValue
+from faao_mav.wire.machine import AT_ONCE, Talk
+from faao_mav.wire.messages import Envelope, ParamRequestRead, ParamSet, ParamValue
+from faao_mav.wire.questions import Pace, Questions, ask
 from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.pace import Pace, Questions
 
 Names: TypeAlias = tuple[str, ...]
 """The names that one parameter has in the generations of an autopilot: a vehicle has one."""
@@ -88,92 +88,54 @@ def close(one: float, other: float) -> bool:
     return same_value(one, other) or math.isclose(one, other, rel_tol=1e-6)
 
 
-class ReadParameters(Machine[Reading]):
-    """A machine that reads `parameters` of the vehicle of `peer`, each by all of its names.
+def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
+    """Read `parameters` of the vehicle of `peer`, each by all of its names.
 
     A name is asked for `_TRIES` times in the pace of the link; who answers none of the first ones
     has no parameters.
     """
-
-    def __init__(self, peer: Peer, parameters: Sequence[Names]) -> None:
-        super().__init__()
-        self._peer = peer
-        self._all = tuple(dict.fromkeys(parameters))
-        self._left = list(self._all)
-        self._asked = Questions[Names](Pace(peer.timeouts))
-        self._asked.least = _LEAST_WAIT
-        self._settings: dict[str, Setting] = {}
-        self._missing: list[Names] = []
-
-    @property
-    def progress(self) -> Progress:
-        """Parameters that are done with, of all."""
-        done = len(self._all) - len(self._left) - len(self._asked)
-        return "reading parameters", done, len(self._all)
-
-    def start(self, now: float) -> Sequence[Message]:
-        """Ask for the first ones."""
-        return self._proceed(now)
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        message = envelope.message
-        if envelope.sender != self._peer.address or not isinstance(message, ParamValue):
-            return ()
-        names = next((each for each in self._asked if message.param_id in each), None)
-        if names is None:
-            return ()
-        self._settings[message.param_id] = setting_in(message, self._peer.vehicle)
-        self._asked.answer(names, now)
-        return self._proceed(now)
-
-    def _time_out(self, now: float) -> Sequence[Message]:
-        out: list[Message] = []
-        for names in self._asked.late(now):
-            if self._asked.times(names) > _TRIES:
-                self._missing.append(names)
-                self._asked.answer(names, now)
-            else:
-                out += self._questions(names)
-        if not self._settings and self._missing:
-            return self.cancel(now)
-        return [*out, *self._proceed(now)]
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Do without those that are not read yet."""
-        self.outcome = Reading(self._settings, (*self._missing, *self._asked, *self._left))
-        return ()
-
-    def _proceed(self, now: float) -> Sequence[Message]:
-        out: list[Message] = []
-        while self._left and sum(map(len, self._asked)) < _AT_ONCE:
-            names = self._left.pop(0)
-            self._asked.put(names, now)
-            out += self._questions(names)
-        if not self._asked:
-            return self.cancel(now)
-        self._due = self._asked.due
-        return out
-
-    def _questions(self, names: Names) -> list[Message]:
-        return [ParamRequestRead(self._peer.address, name, -1) for name in names]
+    line = yield AT_ONCE
+    left = list(dict.fromkeys(parameters))
+    asked, total = Questions[Names](line, Pace(peer.timeouts), _LEAST_WAIT), len(left)
+    names_of = {name: names for names in left for name in names}
+    settings: dict[str, Setting] = {}
+    missing: list[Names] = []
+    while (left or asked) and (settings or not missing):
+        while left and sum(map(len, asked)) < _AT_ONCE:
+            names = left.pop(0)
+            asked.put(names, *(ParamRequestRead(peer.address, name, -1) for name in names))
+        line.progress = "reading parameters", total - len(left) - len(asked), total
+        line = yield asked.due
+        told = _told(peer, line.heard)
+        if told is not None and (names := names_of.get(told.param_id, ())) in asked:
+            settings[told.param_id] = setting_in(told, peer.vehicle)
+            asked.answer(names)
+        missing += asked.repeat(_TRIES) if line.heard is None else []
+    return Reading(settings, (*missing, *asked, *left))
 
 
-def set_parameter(peer: Peer, name: str, setting: Setting) -> Ask[bool]:
-    """Return a machine that sets the parameter `name` of the vehicle of `peer` to `setting`.
+def _told(peer: Peer, heard: Envelope | None) -> ParamValue | None:
+    """Return the parameter that the vehicle of `peer` tells, None if it is something else."""
+    if heard is None or heard.sender != peer.address or not isinstance(heard.message, ParamValue):
+        return None
+    return heard.message
 
-    It tells the value until the vehicle answers with it: setting it twice does no harm.
+
+def set_parameter(peer: Peer, name: str, setting: Setting) -> Talk[bool]:
+    """Set the parameter `name` of the vehicle of `peer`; tell whether it is set.
+
+    It is told the value until it answers with it: setting it twice does no harm.
     """
 
-    def answer(envelope: Envelope) -> bool | None:
-        message = envelope.message
-        if envelope.sender != peer.address or not isinstance(message, ParamValue):
-            return None
-        found = setting_in(message, peer.vehicle)
-        return (message.param_id == name and same_value(found.value, setting.value)) or None
+    def answer(envelope: Envelope) -> ParamValue | None:
+        told = _told(peer, envelope)
+        same = told and same_value(setting_in(told, peer.vehicle).value, setting.value)
+        return told if told and told.param_id == name and same else None
 
     number = on_the_wire(setting, peer.vehicle)
     question = ParamSet(peer.address, name, number, setting.kind)
-    return Ask(f"setting {name}", question, answer, peer.timeouts.silence)
+    told = yield from ask(f"setting {name}", question, answer, peer.timeouts.silence)
+    return told is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,9 +195,7 @@ def named(names: Sequence[str]) -> str:
     return ", ".join(names[:_SHOWN]) + more
 
 
-def set_parameters(
-    wanted: Mapping[str, float], peer: Peer
-) -> Generator[Machine[Any], Any, tuple[tuple[Change, ...], str]]:
+def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[Change, ...], str]]:
     """Give the vehicle of `peer` the parameters of its table that `wanted` names, and read them.
 
     Of the names of one parameter it sets the one that the vehicle has. Nothing is set if the
@@ -244,10 +204,12 @@ def set_parameters(
     """
     table = () if peer.vehicle is None else peer.vehicle.parameters.values()
     groups = {tuple(each.names): each for each in table if each.name_in(wanted) is not None}
-    unknown = [(name,) for name in wanted if not any(name in names for names in groups)]
+    unknown: list[Names] = [
+        (name,) for name in wanted if not any(name in names for names in groups)
+    ]
     before = Reading({})
     if not unknown:
-        before = yield ReadParameters(peer, tuple(groups))
+        before = yield from read_parameters(peer, groups)
         unknown = [*before.missing]
     if unknown:
         names = named([" or ".join(each) for each in unknown])
@@ -260,9 +222,9 @@ def set_parameters(
             asked[name] = number
     for name, number in asked.items():
         kind = before.settings[name].kind
-        if not (yield set_parameter(peer, name, Setting(number, kind))):
+        if not (yield from set_parameter(peer, name, Setting(number, kind))):
             break
-    after: Reading = yield ReadParameters(peer, [(name,) for name in asked])
+    after = yield from read_parameters(peer, [(name,) for name in asked])
     changes = tuple(
         Change(name, before.settings[name].value, number, after.values.get(name))
         for name, number in asked.items()

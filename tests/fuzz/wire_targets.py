@@ -19,7 +19,7 @@ from faao_mav.wire.client import UploadReport
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import Discovery, FoundVehicle, choose
 from faao_mav.wire.framing import Framer
-from faao_mav.wire.machine import Machine, Script, ask_alive, ask_for
+from faao_mav.wire.machine import Machine, Script, Talk
 from faao_mav.wire.messages import (
     CommandLong,
     Heartbeat,
@@ -40,6 +40,7 @@ from faao_mav.wire.protocol import (
     MavCommand,
     MissionType,
 )
+from faao_mav.wire.questions import ask_alive, ask_for
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer.exchange import Peer
 from faao_mav.wire.transfer.session import (
@@ -111,11 +112,15 @@ def _mock(kind: MockKind) -> MockAutopilot:
 def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
     """Return all that a client does once it has found a vehicle."""
     lists = [(part, wire_items(_MISSION, part, peer.vehicle)) for part in MissionType]
-    yield ask_alive(peer.address, 1)
     yield Script(upload_parts(lists, peer))
     yield Script(download_lists(tuple(MissionType), peer))
-    yield ask_for(peer.address, HOME_POSITION, HomePosition)
+    yield Script(_asks(peer))
     yield Script(clear_lists(tuple(MissionType), peer))
+
+
+def _asks(peer: Peer) -> Talk[list[object]]:
+    alive = yield from ask_alive(peer.address, 1)
+    return [alive, (yield from ask_for(peer.address, HOME_POSITION, HomePosition))]
 
 
 def _session(kind: MockKind) -> tuple[bytes, bytes]:

@@ -12,7 +12,7 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
-from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
     Message,
@@ -21,10 +21,8 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
-from faao_mav.wire.transfer.download import Download
-from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer.exchange import Peer, download, upload
 from faao_mav.wire.transfer.session import upload_parts
-from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.wire_items import wire_items
 
 VEHICLE = Address(1, 1)
@@ -180,9 +178,8 @@ def there_and_back(
     peer = peer_of(kind)
     rows = rows_for(kind, count)[:count]
     courses = []
-    machines: tuple[Machine[Any], ...] = (Upload(rows, peer), Download(peer))
-    for machine in machines:
-        client, server = Counted(machine), Counted(mock)
+    for talk in (upload(rows, peer), download(peer)):
+        client, server = Counted(Script(talk)), Counted(mock)
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
         took = simulate(*stations, faults, until=2000.0)
         courses.append(Course(client.outcome.status, took, client.number(), server.number()))

@@ -37,9 +37,8 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
-from faao_mav.wire.transfer.exchange import TENTATIVE, Peer
+from faao_mav.wire.transfer.exchange import TENTATIVE, Peer, upload
 from faao_mav.wire.transfer.session import clear_lists, explain, upload_parts
-from faao_mav.wire.transfer.upload import Upload
 from faao_mav.wire.wire_items import wire_items
 
 MISSION, FENCES = MissionType.MISSION, MissionType.FENCE
@@ -156,7 +155,7 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind: Mo
     for head_start in range(4):
         mock = mock_of(kind)
         ours, theirs = rows_for(kind, 8), rows_for(kind, 9, shift=0.1)
-        rival = Upload(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind)))
+        rival = Script(upload(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind))))
         faults = Faults(latency=0.004 * (1 + head_start), reordering=0.5, delay=0.05)
         report, _ = upload_to(mock, ours, faults, others=[Station(rival, FOREIGN)])
         if report.verified:
@@ -217,7 +216,7 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, wh
     mock = mock_of("px4", beat=0.01)
     mission = a_mission(6, fence=FENCE)
     parts = [(part, wire_items(mission, part, vehicle_of("px4"))) for part in (MISSION, FENCES)]
-    peer = dataclasses.replace(peer_of("px4"), may_be_armed=may_be_armed)
+    peer = Peer(GROUND_STATION, VEHICLE, vehicle_of("px4"), may_be_armed)
     script: Any = Script(upload_parts(parts, peer))
 
     def arm(envelope: Envelope, _: float) -> None:

@@ -18,9 +18,9 @@ from faao_mav.wire.messages import Envelope, ParamSet, ParamValue
 from faao_mav.wire.parameters import (
     Change,
     Names,
-    ReadParameters,
     Setting,
     on_the_wire,
+    read_parameters,
     same_value,
     set_parameters,
     setting_in,
@@ -45,7 +45,7 @@ def groups_of(mock: MockAutopilot) -> tuple[Names, ...]:
 @pytest.mark.parametrize("loss", [0.0, 0.2])
 def test_all_are_read_whatever_is_lost(kind: str, loss: float) -> None:
     mock = mock_of(kind)
-    reading = ReadParameters(peer_of(kind), groups_of(mock))
+    reading = Script(read_parameters(peer_of(kind), groups_of(mock)))
     took = ran(reading, mock, Faults(loss=loss, seed=3))
     assert reading.outcome is not None
     assert reading.outcome.missing == ()
@@ -60,14 +60,14 @@ def test_all_are_read_whatever_is_lost(kind: str, loss: float) -> None:
 def test_what_the_vehicle_does_not_know_is_named_in_time(kind: str) -> None:
     mock = mock_of(kind)
     known = groups_of(mock)
-    reading = ReadParameters(peer_of(kind), [("NEWER", "OLDER"), *known, ("NO_SUCH",)])
+    reading = Script(read_parameters(peer_of(kind), [("NEWER", "OLDER"), *known, ("NO_SUCH",)]))
     took = ran(reading, mock)
     assert reading.outcome is not None
     assert reading.outcome.missing == (("NEWER", "OLDER"), ("NO_SUCH",))
     assert len(reading.outcome.values) == len(set(known))
     assert took < 6
     mock.parameters.values.clear()
-    reading = ReadParameters(peer_of(kind), known)
+    reading = Script(read_parameters(peer_of(kind), known))
     assert ran(reading, mock) < 15
     assert reading.outcome is not None
     assert not reading.outcome.values
@@ -78,14 +78,16 @@ def test_a_vehicle_has_one_name_of_each_parameter() -> None:
     mock = mock_of("ardupilot")
     values = mock.parameters.values
     values["WP_SPD"] = values.pop("WPNAV_SPEED") / 100
-    reading = ReadParameters(peer_of("ardupilot"), [("WP_SPD", "WPNAV_SPEED"), ("FENCE_ENABLE",)])
+    reading = Script(
+        read_parameters(peer_of("ardupilot"), [("WP_SPD", "WPNAV_SPEED"), ("FENCE_ENABLE",)])
+    )
     ran(reading, mock)
     assert reading.outcome is not None
     assert reading.outcome.values == {"WP_SPD": 10.0, "FENCE_ENABLE": 0.0}
 
 
 def test_other_vehicles_are_not_listened_to() -> None:
-    desk = Desk(ReadParameters(peer_of("px4"), [("NAV_DLL_ACT",)]))
+    desk = Desk(Script(read_parameters(peer_of("px4"), [("NAV_DLL_ACT",)])))
     desk.start()
     desk.tell(ParamValue("NAV_DLL_ACT", 0.0, INT32, 1, 0), Address(2, 1))
     desk.tell(ParamValue("NAV_RCL_ACT", 0.0, INT32, 1, 0))

@@ -1,31 +1,20 @@
-"""Whole jobs on a vehicle: upload and verify, download everything, clear and verify.
+"""Whole jobs on a vehicle, as talks: upload and verify, download everything, clear and verify."""
 
-Each is a generator of machines for `Script`, so that it runs on a real link and on a simulated
-one alike.
-"""
-
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Literal, TypeAlias
 
 from faao_mav.mission.item import Mission
-from faao_mav.wire.machine import Machine
+from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType, meaning
-from faao_mav.wire.transfer.download import Download
-from faao_mav.wire.transfer.exchange import TENTATIVE, Clear, Outcome, Peer
-from faao_mav.wire.transfer.upload import Upload
+from faao_mav.wire.transfer.exchange import TENTATIVE, Outcome, Peer, clear, download, upload
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
-
-T = TypeVar("T")
-Job: TypeAlias = Generator[Machine[Any], Outcome, T]
-"""What `Script` runs: yields exchanges, is sent their outcomes, returns its own."""
 
 Verdict: TypeAlias = Literal[
     "verified", "different", "unread", "refused", "silent", "armed", "cancelled"
 ]
-
 
 ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
 """What a vehicle answers that has no such list at all."""
@@ -68,7 +57,7 @@ class Lists:
 
 def upload_parts(
     parts: Sequence[tuple[MissionType, tuple[WireItem, ...]]], peer: Peer
-) -> Job[tuple[PartReport, ...]]:
+) -> Talk[tuple[PartReport, ...]]:
     """Upload lists one after the other, read each back and compare; stop at the first failure.
 
     A transfer that the link broke is begun again, and one whose last answer was lost or whose
@@ -77,18 +66,13 @@ def upload_parts(
     """
     reports: list[PartReport] = []
     for part, items in parts:
-        report, armed = yield from _upload_part(part, items, peer)
-        reports.append(report)
-        if not report.verified:
-            break
-        if armed and not peer.may_be_armed and len(reports) < len(parts):
-            left = parts[len(reports)]
-            reports.append(PartReport(left[0], _own_items(*left, peer), "armed"))
+        reports.append((yield from _upload_part(part, items, peer)))
+        if not reports[-1].verified:
             break
     return tuple(reports)
 
 
-def download_lists(types: Sequence[MissionType], peer: Peer) -> Job["Lists"]:
+def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk["Lists"]:
     """Download the lists of `types`, each that comes.
 
     A vehicle that has no fence or rally points at all is one that has none stored. Where not even
@@ -97,29 +81,28 @@ def download_lists(types: Sequence[MissionType], peer: Peer) -> Job["Lists"]:
     items: dict[MissionType, tuple[WireItem, ...]] = {}
     missing: dict[MissionType, Outcome] = {}
     for part in types:
-        outcome = yield Download(peer, part)
+        outcome = yield from download(peer, part)
         absent = part is not MissionType.MISSION and outcome.result in ABSENT
         if outcome.status == "accepted" or absent:
             items[part] = outcome.items
             continue
         missing[part] = outcome
-        if outcome.by_us or (outcome.status != "refused" and not items):
+        if outcome.status != "refused" and not items:
             break
     return Lists(items, missing)
 
 
-def clear_lists(types: Sequence[MissionType], peer: Peer) -> Job[tuple[PartReport, ...]]:
+def clear_lists(types: Sequence[MissionType], peer: Peer) -> Talk[tuple[PartReport, ...]]:
     """Clear the lists of `types`, and read back that they are empty (but for the home item)."""
     reports = []
     for part in types:
-        cleared = yield Clear(peer, part)
-        report = _failed(part, 0, cleared, 1)
+        cleared = yield from clear(peer, part)
+        report = _unread(part, 0, cleared, 1)
         if cleared.status in ("accepted", "silent"):
-            read = yield Download(peer, part)
+            read = yield from download(peer, part)
             if read.status == "accepted":
-                differences = compare(
-                    read.items[: home_items(peer.vehicle, part)], read.items, part, peer.vehicle
-                )
+                home = read.items[: home_items(peer.vehicle, part)]
+                differences = compare(home, read.items, part, peer.vehicle)
                 verdict: Verdict = "different" if differences else "verified"
                 report = replace(report, verdict=verdict, differences=differences)
         reports.append(report)
@@ -128,22 +111,16 @@ def clear_lists(types: Sequence[MissionType], peer: Peer) -> Job[tuple[PartRepor
     return tuple(reports)
 
 
-def _own_items(part: MissionType, items: Sequence[WireItem], peer: Peer) -> int:
-    """Return how many of `items` are not the home item."""
-    return len(items) - home_items(peer.vehicle, part)
-
-
-def _upload_part(
-    part: MissionType, items: tuple[WireItem, ...], peer: Peer
-) -> Job[tuple[PartReport, bool]]:
-    """Return what became of a list, and whether the vehicle was armed when it was read back."""
-    number = _own_items(part, items, peer)
-    for attempt in range(1, peer.timeouts.attempts + 1):
-        sent: Outcome = yield Upload(items, peer, part)
-        report, armed, stop = _failed(part, number, sent, attempt), sent.armed, sent.by_us
+def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> Talk[PartReport]:
+    """Return what became of a list."""
+    number = len(items) - home_items(peer.vehicle, part)
+    attempt, final = 0, False
+    while not final:
+        attempt += 1
+        sent = yield from upload(items, peer, part)
+        report = _unread(part, number, sent, attempt)
         if sent.status in ("accepted", "unknown"):
-            read: Outcome = yield Download(peer, part)
-            armed, stop = armed or read.armed, read.by_us
+            read = yield from download(peer, part)
             if read.status == "accepted":
                 differences = compare(items, read.items, part, peer.vehicle)
                 right = all(difference.kind != "wrong" for difference in differences)
@@ -156,20 +133,18 @@ def _upload_part(
                     result=None if right and sent.result in TENTATIVE else sent.result,
                     opaque_id=sent.opaque_id or read.opaque_id,
                 )
-            elif read.by_us:
-                report = replace(report, verdict="cancelled")
             elif sent.status == "accepted":
-                report = replace(report, verdict="unread", said=read.said)
+                report = replace(report, said=read.said)
         # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So may
         # DENIED, but not if it is said of every announcement of a whole attempt.
         unheard = report.result == MavResult.DENIED and report.item is None
         refused = report.verdict == "refused" and (unheard or report.result not in TENTATIVE)
-        if report.verdict in ("verified", "armed") or refused or stop:
-            break
-    return report, armed
+        final = refused or report.verdict in ("verified", "armed")
+        final = final or attempt == peer.timeouts.attempts
+    return report
 
 
-def _failed(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
+def _unread(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
     """Return the report for `outcome` as long as nothing was read back."""
     verdict: Verdict
     match outcome.status:
@@ -201,7 +176,7 @@ def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> s
             if report.item is not None:
                 text += f" after it asked for item {report.item} of {rows}"
         case "cancelled":
-            text = "the transfer was cancelled" + (" by the vehicle" if report.result else "")
+            text = "the transfer was cancelled by the vehicle"
         case _:
             text = f"refused: {meaning(report.result or 0, peer.manners.meanings)}"
             if report.result == MavResult.NO_SPACE and peer.vehicle is not None:
