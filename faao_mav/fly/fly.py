@@ -58,7 +58,7 @@ def fly(
     called after every step. Raises `LinkError` if there is no such vehicle, none that is known
     here, or its mission cannot be read.
     """
-    with Session(connection, options) as session:
+    with Session(connection, **options) as session:
         vehicle, peer = session.found, session.peer
         if peer.vehicle is None:
             raise LinkError(f"{connection}: {vehicle}: flights of it are not watched")

@@ -12,7 +12,7 @@ from faao_mav.autopilot import families
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
-from faao_mav.wire.discover import SETTLE, Discovery, FoundVehicle, choose
+from faao_mav.wire.discover import SETTLE, FoundVehicle, choose, discover
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Script, Talk
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition
@@ -178,7 +178,7 @@ def _change(
     options: LinkOptions,
 ) -> UploadReport:
     """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
-    with Session(connection, options, knocks=True) as session:
+    with Session(connection, knocks=True, **options) as session:
         if session.found.armed and not allow_armed:
             raise LinkError(
                 f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
@@ -229,7 +229,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     Raises `LinkError` if there is no such vehicle or its mission does not come whole; a vehicle
     that has no fence or rally points at all is one that has none stored.
     """
-    with Session(connection, options, knocks=True) as session:
+    with Session(connection, knocks=True, **options) as session:
         peer = session.peer
         lists, told = session.run(_all_held(peer))
         missing = {part: session.not_read(part, why) for part, why in lists.missing.items()}
@@ -259,33 +259,54 @@ def _all_held(peer: Peer) -> Talk[tuple[Lists, HomePosition | None]]:
 class Session:
     """A link to the one vehicle that has been found; to be used in a `with` statement.
 
-    With `knocks` one is woken up that waits for a heartbeat on a serial line: see `Discovery`.
+    The arguments are those of `LinkOptions`. With `knocks` a vehicle is woken up that waits for a
+    heartbeat on a serial line: see `discover`.
     """
 
-    def __init__(self, connection: str, options: LinkOptions, *, knocks: bool = False) -> None:
-        if unknown := set(options) - set(LinkOptions.__annotations__):
-            known = ", ".join(LinkOptions.__annotations__)
-            raise TypeError(f"there is no option {min(unknown)!r}; expected some of {known}")
-        self._observe, self._note = options.get("observe"), options.get("note") or warnings.warn
-        self._key_file = options.get("signing_key")
-        self._timeouts = options.get("timeouts") or Timeouts()
+    def __init__(
+        self,
+        connection: str,
+        *,
+        knocks: bool = False,
+        system: int | None = None,
+        component: int | None = None,
+        own_system: int | None = None,
+        log: Path | None = None,
+        signing_key: Path | None = None,
+        wait: float = 10.0,
+        timeouts: Timeouts | None = None,
+        observe: Observe | None = None,
+        note: Callable[[str], object] | None = None,
+    ) -> None:
         self.started = time.monotonic()
-        self._signing = None if self._key_file is None else read_signing(self._key_file)
-        own = options.get("own_system") or GROUND_STATION.system
+        self._observe, self._note, self._key_file = observe, note or warnings.warn, signing_key
+        self._signing = None if signing_key is None else read_signing(signing_key)
+        own = Address(own_system or GROUND_STATION.system, GROUND_STATION.component)
         self.link = WireLink(
-            connection,
-            signing=self._signing,
-            log=options.get("log"),
-            address=Address(own, GROUND_STATION.component),
-            note=self._note,
+            connection, signing=self._signing, log=log, address=own, note=self._note
+        )
+        timeouts = timeouts or Timeouts()
+        search = discover(
+            system,
+            component,
+            patience=wait,
+            settle=SETTLE if self.link.listens else None,
+            boot=timeouts.boot,
+            knocks=knocks and parse_connection(connection).kind == "serial",
         )
         try:
-            self.found = self._find(connection, options, knocks)
+            heard = self.run(search)
+            for verdict, text in _PASSED_OVER.items():
+                if self._signing and not heard.vehicles and verdict in self.link.heard:
+                    told = text.format(key=signing_key)
+                    raise LinkError(f"{connection}: no vehicle: {told}")
+            self.found = choose(heard, connection, system, component, wait)
+            self.link.bind(self.found.address, *self.found.origins)
+            self._check_alive(connection, timeouts)
         except BaseException:
             self.close()
             raise
-        ends = self.link.address, self.found.address
-        self.peer = Peer(*ends, self.found.vehicle, timeouts=self._timeouts)
+        self.peer = Peer(own, self.found.address, self.found.vehicle, timeouts=timeouts)
 
     def __enter__(self) -> "Session":
         return self
@@ -301,42 +322,25 @@ class Session:
         if self.link.log is not None and self.link.log.failure is not None:
             self._note(self.link.log.failure)
 
-    def _find(self, connection: str, options: LinkOptions, knocks: bool) -> FoundVehicle:
-        """Return the vehicle that there is, bound to the link and alive."""
-        names = options.get("system"), options.get("component")
-        wait = options.get("wait", 10.0)
-        discovery = Discovery(
-            *names,
-            patience=wait,
-            settle=SETTLE if self.link.listens else None,
-            boot=self._timeouts.boot,
-            knocks=knocks and parse_connection(connection).kind == "serial",
-        )
-        found = self.link.run(discovery, self._observe)
-        if self._signing is not None and not found:
-            for verdict, text in _PASSED_OVER.items():
-                if verdict in self.link.heard:
-                    raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
-        one = choose(found, connection, *names, wait, discovery.others.values())
-        self.link.bind(one.address, *one.origins)
-        old = self.link.speaks_old(one.address)
+    def _check_alive(self, connection: str, timeouts: Timeouts) -> None:
+        """Raise `LinkError` for a recording, and for a vehicle that does not read MAVLink 2."""
+        old = self.link.speaks_old(self.found.address)
         if self._signing is None and not old:
-            return one
-        if self.run(ask_alive(one.address, secrets.randbits(62), self._timeouts.silence)):
-            return one
+            return
+        asked = ask_alive(self.found.address, secrets.randbits(62), timeouts.silence)
+        if self.run(asked):
+            return
         why = (
             "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "
             "or a recording of it?"
         )
         if old:
-            ports = "; ".join(
-                f"{each.name}: {each.mavlink_2}" for each in families() if each.mavlink_2
-            )
+            ports = [f"{each.name}: {each.mavlink_2}" for each in families() if each.mavlink_2]
             why = (
                 "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
-                f"2 ({ports})"
+                f"2 ({'; '.join(ports)})"
             )
-        raise LinkError(f"{connection}: {one}: {why}")
+        raise LinkError(f"{connection}: {self.found}: {why}")
 
     def not_read(self, part: MissionType, outcome: Outcome) -> str:
         """Return in words why a list was not read."""

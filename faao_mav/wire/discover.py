@@ -1,6 +1,6 @@
 """Who is on the link, and ready for a mission."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from faao_mav.autopilot import (
@@ -12,10 +12,9 @@ from faao_mav.autopilot import (
     vehicle_type_by_numbers,
 )
 from faao_mav.errors import LinkError
-from faao_mav.wire.machine import Machine
-from faao_mav.wire.messages import Envelope, Heartbeat, Message, Timesync
+from faao_mav.wire.machine import AT_ONCE, Talk
+from faao_mav.wire.messages import Heartbeat, Timesync
 from faao_mav.wire.protocol import (
-    AUTOPILOT_COMPONENT,
     COMPANION_TYPE,
     GROUND_STATION_TYPE,
     NO_AUTOPILOT,
@@ -26,6 +25,9 @@ from faao_mav.wire.transport import Origin
 
 _SHOWN = 5
 """Vehicles that a message lists, at most; chosen."""
+
+_MAIN = 1
+"""MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
 SETTLE = 1.2
 """Seconds after the first vehicle in which others are heard: chosen, above a heartbeat's period."""
@@ -39,6 +41,8 @@ _GREET = 1.0
 
 _KNOCK = 2.0
 """Seconds of silence before a heartbeat is sent into it: chosen, two heartbeats of a vehicle."""
+
+_NOTHING = "is it switched on and connected there, and no other program in between?"
 
 _KNOCKING = Heartbeat(COMPANION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)
 """A heartbeat that counts nowhere: not a ground station's, and of another system."""
@@ -72,13 +76,28 @@ class FoundVehicle:
         return f"{name} {self.kind} ({self.address}, {state})"
 
 
-class Discovery(Machine[tuple[FoundVehicle, ...]]):
-    """A machine that listens for heartbeats; its outcome is the autopilots heard, by address.
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """The autopilots that were heard, by address, and in words what else was."""
+
+    vehicles: tuple[FoundVehicle, ...]
+    others: tuple[str, ...] = ()
+
+
+def discover(
+    system: int | None = None,
+    component: int | None = None,
+    *,
+    patience: float = 10.0,
+    settle: float | None = None,
+    boot: float = 60.0,
+    knocks: bool = False,
+) -> Talk[Heard]:
+    """Listen for heartbeats.
 
     Only what flies counts, by its MAV_TYPE: not what else is on board or on the link. Of a system
     that is component 1, for which it waits as long as it has `patience`, and any other only
-    without it. `system` and `component` leave out all others. `others` has what else was heard, in
-    words.
+    without it. `system` and `component` leave out all others.
 
     It ends `settle` seconds after the first, in which others are heard, once all are ready (at once
     where a `system` is given, unless told otherwise); after `patience` seconds without any; and
@@ -88,105 +107,57 @@ class Discovery(Machine[tuple[FoundVehicle, ...]]):
     where it was spoken to has to be spoken to. With `knocks` it sends a heartbeat too where nothing
     at all is heard: PX4 1.13 and 1.14 say nothing on USB before they hear one.
     """
-
-    progress = ("listening for a vehicle", 0, 0)
-
-    def __init__(
-        self,
-        system: int | None = None,
-        component: int | None = None,
-        *,
-        patience: float = 10.0,
-        settle: float | None = None,
-        boot: float = 60.0,
-        knocks: bool = False,
-    ) -> None:
-        super().__init__()
-        self._system, self._component = system, component
-        usual = SETTLE if system is None else 0.0
-        self._settle = usual if settle is None else settle
-        self._patience, self._boot, self._knocks = patience, boot, knocks
-        self._found: dict[Address, FoundVehicle] = {}
-        self._origins: dict[Address, dict[Origin, None]] = {}
-        self._begun = self._settled = 0.0
-        self.others: dict[Address, str] = {}
-
-    def start(self, now: float) -> Sequence[Message]:
-        """Listen."""
-        self._begun = now
-        return self._greet(now)
-
-    def _greet(self, now: float) -> Sequence[Message]:
-        self._due = min(now + _GREET, self._begun + self._patience)
-        knocks = self._knocks and now >= self._begun + _KNOCK
-        return [Timesync(0, int(now * 1e9)), *([_KNOCKING] if knocks else [])]
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        message, sender = envelope.message, envelope.sender
-        self._knocks = False
-        self._origins.setdefault(sender, {})[envelope.origin] = None
-        if not isinstance(message, Heartbeat) or message.type == GROUND_STATION_TYPE:
-            return ()
-        found = _found_vehicle(sender, message)
-        chosen = Address(self._system or sender.system, self._component or sender.component)
-        if sender != chosen or not message.of_autopilot:
-            kind = str(found) if message.of_autopilot else f"MAV_TYPE {message.type} ({sender})"
-            self.others[sender] = kind
-            return ()
-        if not self._found:
-            self._due = self._settled = now + self._settle
-        before = self._found.get(sender, found)
-        self._found[sender] = replace(found, armed=found.armed or before.armed)
-        return self.tick(now)
-
-    def _time_out(self, now: float) -> Sequence[Message]:
-        """End, if all that is waited for is there; else ask, or look again soon."""
-        waited = now >= self._begun + self._patience
-        if not (self._found or waited):
-            return self._greet(now)
-        mains = {address.system for address in self._found if _is_main(address)}
-        found = tuple(
-            replace(self._found[address], origins=tuple(self._origins[address]))
-            for address in sorted(self._found)
-            if _is_main(address) or address.system not in mains
-        )
-        complete = waited or self._component or all(_is_main(each.address) for each in found)
-        ready = all(each.ready for each in found) or now >= self._begun + self._boot
-        if now >= self._settled and complete and ready:
-            self.outcome = found
-        self._due = now + _LOOK_AGAIN
-        return ()
-
-    def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Stop listening."""
-        self.outcome = self.outcome or ()
-        return ()
-
-
-def _is_main(address: Address) -> bool:
-    return address.component == AUTOPILOT_COMPONENT
+    line = yield AT_ONCE
+    line.progress = "listening for a vehicle", 0, 0
+    begun = due = settled = line.now
+    found, others = dict[Address, FoundVehicle](), dict[Address, str]()
+    origins = dict[Address, dict[Origin, None]]()
+    while True:
+        if line.heard is not None:
+            knocks, sender, message = False, line.heard.sender, line.heard.message
+            origins.setdefault(sender, {})[line.heard.origin] = None
+            if isinstance(message, Heartbeat) and message.type != GROUND_STATION_TYPE:
+                vehicle = _found_vehicle(sender, message)
+                meant = system in (None, sender.system) and component in (None, sender.component)
+                if not (meant and message.of_autopilot):
+                    beside = f"MAV_TYPE {message.type} ({sender})"
+                    others[sender] = str(vehicle) if message.of_autopilot else beside
+                else:
+                    if not found:
+                        usual = SETTLE if system is None else 0.0
+                        due = settled = line.now + (usual if settle is None else settle)
+                    armed = vehicle.armed or (sender in found and found[sender].armed)
+                    found[sender] = replace(vehicle, armed=armed)
+        waited = line.now >= begun + patience
+        if line.now >= due and not (found or waited):
+            late = knocks and line.now >= begun + _KNOCK
+            line.say(Timesync(0, int(line.now * 1e9)), *[_KNOCKING] * late)
+            due = min(line.now + _GREET, begun + patience)
+        elif line.now >= due:
+            mains = {address.system for address in found if address.component == _MAIN}
+            vehicles = tuple(
+                replace(found[address], origins=tuple(origins[address]))
+                for address in sorted(found)
+                if address.component == _MAIN or address.system not in mains
+            )
+            complete = all(each.address.component == _MAIN for each in vehicles)
+            ready = all(each.ready for each in vehicles) or line.now >= begun + boot
+            if line.now >= settled and ready and (complete or waited or component):
+                return Heard(vehicles, tuple(others.values()))
+            due = line.now + _LOOK_AGAIN
+        line = yield due
 
 
 def choose(
-    found: Sequence[FoundVehicle],
-    connection: str,
-    system: int | None,
-    component: int | None,
-    patience: float,
-    others: Iterable[str] = (),
+    heard: Heard, connection: str, system: int | None, component: int | None, patience: float
 ) -> FoundVehicle:
-    """Return the one vehicle that was `found`; raises `LinkError` if there is none, or several.
-
-    `others` is what else was heard, in words.
-    """
+    """Return the one vehicle that was `heard`; raises `LinkError` if there is none, or several."""
+    found = heard.vehicles
     if not found:
         who = "an autopilot" if system is None else f"the autopilot of system {system}"
         who += "" if component is None else f" with component number {component}"
-        heard = _listed(tuple(others))
-        hint = "is it switched on and connected there, and no other program in between?"
-        problem = f"no heartbeat of {who} within {patience:g} s; " + (
-            f"there is only {heard}" if heard else hint
-        )
+        others = f"there is only {_listed(heard.others)}" if heard.others else _NOTHING
+        problem = f"no heartbeat of {who} within {patience:g} s; {others}"
     elif twins := [each for each in found if len(each.origins) > 1]:
         origins = " and ".join(twins[0].origins[:_SHOWN])
         problem = (

@@ -131,8 +131,6 @@ AIRFRAMES = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43,
 """MAV_TYPE of what an autopilot moves. All others are beside one: ground stations, companions,
 gimbals, cameras, ADS-B and remote identification, antenna trackers, parachutes, radios."""
 
-AUTOPILOT_COMPONENT = 1
-"""MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
 NO_AUTOPILOT = 8
 """MAV_AUTOPILOT_INVALID: what ground stations and other components say that they are."""

@@ -17,7 +17,7 @@ from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire.client import UploadReport
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.discover import Discovery, FoundVehicle, choose
+from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.framing import Framer
 from faao_mav.wire.machine import Machine, Script, Talk
 from faao_mav.wire.messages import (
@@ -127,7 +127,7 @@ def _session(kind: MockKind) -> tuple[bytes, bytes]:
     """Return what the client and a mock hear of each other from the heartbeat to the clearing."""
     mock, station, vehicle = _mock(kind), Codec(GROUND_STATION), Codec(_VEHICLE)
     peer = Peer(GROUND_STATION, _VEHICLE, vehicle_type(mock.vehicle.family.key, "copter"))
-    tapes = [recorded(job, station, mock, vehicle) for job in (Discovery(1), *_jobs(peer))]
+    tapes = [recorded(job, station, mock, vehicle) for job in (Script(discover(1)), *_jobs(peer))]
     ours, theirs = zip(*tapes, strict=True)
     return b"".join(ours), b"".join(theirs)
 
@@ -135,7 +135,7 @@ def _session(kind: MockKind) -> tuple[bytes, bytes]:
 def _hear(tape: bytes) -> object:
     """Do all that a client does with a vehicle that says what is on `tape`, and tell of it."""
     codec, heard = Codec(GROUND_STATION), datagrams(tape)
-    discovery = Discovery(patience=1.0, settle=0.0)
+    discovery = Script(discover(patience=1.0, settle=0.0))
     now = converse(discovery, codec, heard, 0.0)
     assert discovery.outcome is not None
     found = choose(discovery.outcome, "tape", None, None, 1.0)

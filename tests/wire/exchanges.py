@@ -25,9 +25,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from simulators import simulated
 
-from faao_mav.wire.discover import Discovery
+from faao_mav.wire.discover import discover
 from faao_mav.wire.link import WireLink
-from faao_mav.wire.machine import Machine
+from faao_mav.wire.machine import Machine, Script
 from faao_mav.wire.messages import (
     Envelope,
     ListMessage,
@@ -190,7 +190,7 @@ def recorded(kind: str) -> str:
 def renewed(kind: str, autopilots: Path, where: Path) -> str:
     """Return these exchanges with the answers that the real one gives now."""
     with simulated(autopilots, kind, where) as connection, WireLink(connection) as link:
-        (found,) = link.run(Discovery(patience=20.0))
+        (found,) = link.run(Script(discover(patience=20.0))).vehicles
 
         def talk(messages: list[Message], patience: float, expected: int) -> list[Message]:
             # What is said late, on a busy machine, is waited for.

@@ -330,9 +330,3 @@ def test_a_link_in_use_is_let_go_of(port: int) -> None:
     for _ in range(2):
         with WireLink(f"udpin:127.0.0.1:{port}"):
             pass
-
-
-def test_an_option_that_there_is_none_of_is_an_error() -> None:
-    options: Any = {"sytem": 1}
-    with pytest.raises(TypeError, match="no option 'sytem'; expected some of system, component"):
-        download("udpout:127.0.0.1:9", **options)

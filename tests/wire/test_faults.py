@@ -28,7 +28,7 @@ from faao_mav.errors import LinkError
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults, Lost
 from faao_mav.sim.lists import StoredLists
-from faao_mav.wire.discover import Discovery, choose
+from faao_mav.wire.discover import choose, discover
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
@@ -321,21 +321,23 @@ def test_what_a_channel_does() -> None:
 def test_a_type_of_vehicle_that_is_not_supported_is_said(
     mav_type: int, autopilot: int, name: str
 ) -> None:
-    search = Discovery(system=1)
+    search = Script(discover(system=1))
     search.start(0.0)
     search.on(Envelope(VEHICLE, Heartbeat(mav_type, autopilot, 0, 0, 3)), 0.5)
+    assert search.outcome is not None
     with pytest.raises(LinkError, match=f"{name} vehicle of MAV_TYPE {mav_type} .* not supported"):
-        choose(search.outcome or (), "udpin:0.0.0.0:14550", 1, None, 10.0)
+        choose(search.outcome, "udpin:0.0.0.0:14550", 1, None, 10.0)
 
 
 def test_an_autopilot_that_is_registered_is_found_and_served_as_the_guide_says() -> None:
     family = dataclasses.replace(PX4_COPTER.family, key="toy", name="Toy", mav_autopilot=99)
     toy = register(dataclasses.replace(PX4_COPTER, family=family))
     try:
-        search = Discovery(system=1)
+        search = Script(discover(system=1))
         search.start(0.0)
         search.on(Envelope(VEHICLE, Heartbeat(2, 99, 0, 0, 3)), 0.5)
-        (found,) = search.outcome or ()
+        assert search.outcome is not None
+        (found,) = search.outcome.vehicles
         assert str(found) == "Toy copter (system 1, component 1, disarmed)"
         mock, rows = mock_of("px4"), rows_for("px4", 6)
         peer = Peer(GROUND_STATION, VEHICLE, found.vehicle)

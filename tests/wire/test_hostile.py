@@ -21,8 +21,8 @@ from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import download, upload
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.discover import Discovery, choose
-from faao_mav.wire.machine import Machine
+from faao_mav.wire.discover import choose, discover
+from faao_mav.wire.machine import Machine, Script
 from faao_mav.wire.messages import (
     CommandAck,
     CommandLong,
@@ -171,7 +171,7 @@ def test_an_altitude_that_a_vehicle_should_have_refused_is_compared(z: float) ->
 
 
 def test_a_crowd_of_vehicles_is_told_in_a_few_lines() -> None:
-    discovery = Discovery(patience=1.0)
+    discovery = Script(discover(patience=1.0))
     discovery.start(0.0)
     for number in range(20_000):
         sender = Address(number % 255, number // 255)

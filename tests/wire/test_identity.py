@@ -26,8 +26,9 @@ from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import Timeouts, download, upload
 from faao_mav.wire.client import LinkOptions, holdings
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.discover import Discovery, FoundVehicle, choose
+from faao_mav.wire.discover import FoundVehicle, Heard, choose, discover
 from faao_mav.wire.framing import message_id, sender_of
+from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
@@ -58,7 +59,8 @@ def found(
     heard: Sequence[tuple[float, Address, Heartbeat]], **options: Any
 ) -> tuple[tuple[FoundVehicle, ...], float]:
     """Return what is found by what is heard at which times, and when."""
-    search, left = Discovery(patience=10.0, **options), sorted(heard, key=lambda each: each[0])
+    search = Script(discover(patience=10.0, **options))
+    left = sorted(heard, key=lambda each: each[0])
     search.start(0.0)
     now = 0.0
     while (due := search.deadline) is not None:
@@ -69,7 +71,7 @@ def found(
             now = due
             search.tick(now)
     assert search.outcome is not None
-    return search.outcome, now
+    return search.outcome.vehicles, now
 
 
 def addresses(vehicles: Sequence[FoundVehicle]) -> list[Address]:
@@ -115,7 +117,7 @@ def test_another_component_is_it_only_where_there_is_no_first() -> None:
     assert (addresses(vehicles), now) == ([COMPANION], 0.5)
     two, _ = found([(0.5, COMPANION, BEAT), (0.6, Address(1, 2), BEAT)])
     with pytest.raises(LinkError, match=r"several autopilots: .* Choose one with --component"):
-        choose(two, "udpin:0.0.0.0:14550", None, None, 10.0)
+        choose(Heard(two), "udpin:0.0.0.0:14550", None, None, 10.0)
 
 
 def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
@@ -125,14 +127,14 @@ def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
 
 
 def test_what_else_was_heard_is_told() -> None:
-    search = Discovery(system=9, patience=1.0)
+    search: Any = Script(discover(system=9, patience=1.0))
     search.start(0.0)
     search.on(Envelope(Address(9, 154), Heartbeat(26, 8, 0, 0, 4)), 0.1)
     search.on(Envelope(VEHICLE, BEAT), 0.2)
     search.tick(1.0)
     told = r"system 9 within 1 s; there is only MAV_TYPE 26 \(system 9, component 154\); ArduPilot"
     with pytest.raises(LinkError, match=told):
-        choose(search.outcome or (), "x", 9, None, 1.0, search.others.values())
+        choose(search.outcome, "x", 9, None, 1.0)
 
 
 @pytest.mark.parametrize("sender", [VEHICLE, COMPANION])
@@ -186,15 +188,15 @@ def test_two_vehicles_of_one_number_are_not_one(system: int | None) -> None:
 
 def test_another_vehicle_is_noticed_by_whatever_it_says() -> None:
     """Its heartbeat may be lost."""
-    search = Discovery()
+    search: Any = Script(discover())
     search.start(0.0)
     search.on(Envelope(VEHICLE, BEAT, "192.0.2.1:14550"), 0.1)
     search.on(Envelope(VEHICLE, Statustext(6, "hello"), ELSEWHERE), 0.5)
     search.tick(1.5)
-    (vehicle,) = search.outcome or ()
+    (vehicle,) = search.outcome.vehicles
     assert vehicle.origins == ("192.0.2.1:14550", ELSEWHERE)
     with pytest.raises(LinkError, match=f"is heard from 192.0.2.1:14550 and {ELSEWHERE}"):
-        choose([vehicle], "udpin:0.0.0.0:14550", None, None, 10.0)
+        choose(search.outcome, "udpin:0.0.0.0:14550", None, None, 10.0)
 
 
 def test_nothing_is_started_that_has_a_namesake() -> None:
@@ -389,19 +391,19 @@ def test_a_vehicle_that_takes_orders_of_one_number_only(sent: list[bytes]) -> No
 
 def test_who_is_looked_for_is_asked_not_told() -> None:
     """Of a vehicle that answers where it is spoken to it has to be heard that we are there."""
-    search = Discovery(patience=4.5)
+    search: Any = Script(discover(patience=4.5))
     asked = list(search.start(0.0))
     for now in range(1, 6):
         asked += search.tick(float(now))
     assert [type(each) for each in asked] == [Timesync] * 5
-    assert search.outcome == ()
+    assert search.outcome.vehicles == ()
 
 
 def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
     """PX4 1.13 and 1.14 on USB; it is that of no ground station, and only into a silence."""
 
     def asks(*heard: tuple[float, Message]) -> list[tuple[float, int]]:
-        search, out = Discovery(patience=6.0, knocks=True), list[tuple[float, int]]()
+        search, out = Script(discover(patience=6.0, knocks=True)), list[tuple[float, int]]()
         search.start(0.0)
         for step in range(1, 13):
             now = step / 2
@@ -420,12 +422,11 @@ def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
 def test_only_transfers_knock(monkeypatch: pytest.MonkeyPatch) -> None:
     knocks = list[bool]()
 
-    class Looked(Discovery):
-        def __init__(self, *names: Any, **options: Any) -> None:
-            knocks.append(options["knocks"])
-            super().__init__(*names, **options)
+    def looked(*names: Any, **options: Any) -> Any:
+        knocks.append(options["knocks"])
+        return discover(*names, **options)
 
-    monkeypatch.setattr("faao_mav.wire.client.Discovery", Looked)
+    monkeypatch.setattr("faao_mav.wire.client.discover", looked)
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Airspace(lambda _: []))
     options = LinkOptions(wait=0.05)
     for connection in ("/dev/ttyACM0", "udpin:0.0.0.0:1"):
