@@ -39,28 +39,34 @@ _HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_
 _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
 
+def _beyond(context: ValidationContext, rule: str, measure: str, limit: float | None) -> Hits:
+    """Yield the places whose `measure`, "up" or "from_origin", m, is beyond `limit`, if any is."""
+    for place in context.places if limit is not None else ():
+        known = measure == "up" or context.home is not None
+        if limit is not None and known and getattr(place, measure) > limit:
+            yield hit(rule, place.index, place=place, limit=limit)
+
+
 @checks()
-def _heights(context: ValidationContext) -> Hits:
-    """How high the places are."""
-    ceiling, highest = context.limits.max_altitude, None
+def _places(context: ValidationContext) -> Hits:
+    """Places beyond the limits that were given, and beyond what is sensible."""
+    limits, ceiling = context.limits, context.limits.max_altitude
+    yield from _beyond(context, "too-high", "up", HIGHEST)
+    yield from _beyond(context, "above-ceiling", "up", ceiling)
+    yield from _beyond(context, "beyond-distance", "from_origin", limits.max_distance)
     for place in context.places:
         command = context.items[place.index].command
         if place.up < 0 and command not in LANDINGS | TAKEOFFS:
             yield hit("below-home", place.index, below=-place.up, **_raised(context, place))
         elif place.up < LEAST_HEIGHT and command not in LANDINGS:
             yield hit("near-ground", place.index, place=place, **_raised(context, place))
-        if place.up > HIGHEST:
-            yield hit("too-high", place.index, place=place)
-        if ceiling is not None and place.up > ceiling:
-            yield hit("above-ceiling", place.index, place=place)
-        if place.up > max(COMMON_CEILING, highest.up if highest else 0.0):
-            highest = place
-    if highest is not None and ceiling is None:
-        yield hit("above-120-m", highest.index, place=highest)
     height, name = context.parameter("return_height")
     if ceiling is not None and height > ceiling:
         newest = context.vehicle.type.parameters["return_height"].newest_name
         yield hit("return-above-ceiling", height=height, name=name, newest=newest)
+    above = (place for place in context.places if place.up > COMMON_CEILING and ceiling is None)
+    if (highest := max(above, key=lambda place: place.up, default=None)) is not None:
+        yield hit("above-120-m", highest.index, place=highest)
 
 
 def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
@@ -76,19 +82,15 @@ def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
 def _distances(context: ValidationContext) -> Hits:
     """How far the places are from home, and from each other."""
     home, farthest = context.mission.home, 1000 * _FARTHEST[context.vehicle.type.hovers]
-    limit = context.limits.max_distance
     for place in context.places if home is not None else ():
         away, item = place.from_origin, context.items[place.index]
         if home is not None and away > farthest:
             swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < _SWAPPED
             slip = "latitude and longitude look exchanged: correct them"
-            yield hit(
-                "too-far", place.index, away=away / 1000, slip=slip if swapped else "correct it"
-            )
-        elif limit is None and away > 1000 * FAR:
+            told = {"away": away / 1000, "slip": slip if swapped else "correct it"}
+            yield hit("too-far", place.index, **told)
+        elif context.limits.max_distance is None and away > 1000 * FAR:
             yield hit("far-from-home", place.index, away=away / 1000)
-        if limit is not None and away > limit:
-            yield hit("beyond-distance", place.index, place=place)
     for leg in context.legs:
         near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
         if leg.length > 1000 * FAR and near and HOME not in (leg.start.index, leg.end.index):
@@ -101,25 +103,21 @@ def _cage(context: ValidationContext) -> Hits:
     value = context.vehicle.value
     kinds = int(value("fence_type")) if value("fence_enable") != 0 else 0
     ceiling, floor, radius = (value(f"fence_{key}") for key in ("ceiling", "floor", "radius"))
-    for place in context.places:
-        lands = context.items[place.index].command == Command.NAV_LAND
-        if kinds & 1 and place.up > ceiling:
-            yield hit("ardupilot-fence-ceiling", place.index, place=place, limit=ceiling)
-        if kinds & 8 and place.up < floor and not lands:
+    yield from _beyond(context, "ardupilot-fence-ceiling", "up", ceiling if kinds & 1 else None)
+    yield from _beyond(
+        context, "ardupilot-fence-circle", "from_origin", radius if kinds & 2 else None
+    )
+    for place in context.places if kinds & 8 else ():
+        if place.up < floor and context.items[place.index].command != Command.NAV_LAND:
             yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
-        if kinds & 2 and context.home is not None and place.from_origin > radius:
-            yield hit("ardupilot-fence-circle", place.index, place=place, limit=radius)
 
 
 @checks("px4")
 def _px4_cage(context: ValidationContext) -> Hits:
     """The bounds about home that are on above 0."""
     far, high = context.vehicle.value("fence_distance"), context.vehicle.value("fence_height")
-    for place in context.places:
-        if 0 < far < place.from_origin and context.home is not None:
-            yield hit("px4-max-horizontal", place.index, place=place, limit=far)
-        if 0 < high < place.up:
-            yield hit("px4-max-vertical", place.index, place=place, limit=high)
+    yield from _beyond(context, "px4-max-horizontal", "from_origin", far if far > 0 else None)
+    yield from _beyond(context, "px4-max-vertical", "up", high if high > 0 else None)
 
 
 @checks()
