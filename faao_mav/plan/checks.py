@@ -1,6 +1,7 @@
 """What no single key can tell: whether the keys of a plan agree with each other."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -14,7 +15,7 @@ from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.model import PlanContents
 from faao_mav.plan.sections import Flight
 from faao_mav.power import RotaryWing
-from faao_mav.vector import Vector, chord
+from faao_mav.vector import chord
 
 MAX_SLOTS = 100_000
 """Most time slots; chosen: the direct method solves 10,000 in 0.6 s; more is not measured."""
@@ -131,7 +132,7 @@ def _distance(plan: PlanContents) -> Iterator[str]:
     distance = math.dist(flight.start, flight.end)
     if reach(flight.slots - 1, plan) >= distance - _SLACK:
         return
-    needed = shortest_duration(plan)
+    needed = fewest_slots(plan) * flight.time_step
     takes = f"at least {needed:.10g} s" if needed else "longer than can be planned"
     yield (
         f"flight.duration: {flight.duration:g} s is too short: from start to end is "
@@ -223,48 +224,28 @@ def reach(steps: int, plan: PlanContents) -> float:
     flight = plan.flight
     dt, limit = flight.time_step, plan.max_ground_speed
     gain = plan.vehicle.max_acceleration * dt
-    direction = np.array(_direction(flight))
+    way = np.subtract(flight.end, flight.start)
+    direction = way / (math.hypot(*way) or 1.0)
     n = np.arange(steps + 1, dtype=float)
     speed = np.full(steps + 1, limit)
     if flight.start_velocity is not None:
-        first = math.fsum(v * d for v, d in zip(flight.start_velocity, direction, strict=True))
+        first = float(np.dot(flight.start_velocity, direction))
         if flight.bound_first_acceleration:
             np.minimum(speed, first + n * gain, out=speed)
         speed[0] = min(first, limit)
     if flight.end_velocity is not None:
-        last = math.fsum(v * d for v, d in zip(flight.end_velocity, direction, strict=True))
+        last = float(np.dot(flight.end_velocity, direction))
         np.minimum(speed, last + n[::-1] * gain, out=speed)
     farthest = float(dt * (speed[:-1] + speed[1:]).sum() / 2)
     return min(farthest, dt * steps * chord(plan.wind, plan.max_airspeed, direction)[1])
 
 
 def fewest_slots(plan: PlanContents) -> int:
-    """Return the least number of slots in which `plan`, whose own are enough, can be flown."""
-    shortest = shortest_duration(plan)
-    assert shortest is not None  # the plan's own duration is no shorter
-    return max(round(shortest / plan.flight.time_step), FEWEST_SLOTS)
+    """Return the least number of slots whose `reach` covers the distance; 0 for too many to plan.
 
-
-def shortest_duration(plan: PlanContents) -> float | None:
-    """Return the least T = (N + 2) dt whose reach covers the distance, s; None past `MAX_SLOTS`."""
-    flight = plan.flight
-    distance = math.dist(flight.start, flight.end)
-
-    def enough(slots: int) -> bool:
-        return reach(slots - 1, plan) >= distance
-
-    low, high = 2, 4
-    while not enough(high):
-        low, high = high, 2 * high
-        if high > 2 * MAX_SLOTS:
-            return None
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if enough(middle) else (middle, high)
-    return high * flight.time_step
-
-
-def _direction(flight: Flight) -> Vector:
-    east, north = (b - a for a, b in zip(flight.start, flight.end, strict=True))
-    distance = math.hypot(east, north)
-    return (east / distance, north / distance) if distance else (0.0, 0.0)
+    It is at most `plan.flight.slots` for a plan that has been checked.
+    """
+    sizes = range(FEWEST_SLOTS, 2 * MAX_SLOTS)
+    distance = math.dist(plan.flight.start, plan.flight.end)
+    at = bisect_left(sizes, True, key=lambda slots: reach(slots - 1, plan) >= distance - _SLACK)
+    return sizes[at] if at < len(sizes) else 0

@@ -7,7 +7,7 @@ error. What plans have no use for is refused before it is built: anchors' aliase
 import io
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer
@@ -37,27 +37,14 @@ _MAX_PROBLEM = 200
 _MAX_WIDTH = 4096
 """Characters of a line at which long values are folded when written; chosen."""
 
-_CORE_SCHEMA = (
-    ("null", r"~|null|Null|NULL|", "~nN\0"),
-    ("bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
-    ("int", r"[-+]?[0-9]+", "-+0123456789"),
-    (
-        "float",
-        r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
-        r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
-        "-+.0123456789",
-    ),
-)
-"""Type, pattern and first characters (NUL: none) of the words that are no text, without 0x, 0o."""
-
-
-def _by_first_character() -> dict[str, list[tuple[str, re.Pattern[str]]]]:
-    found: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
-    for name, pattern, first in _CORE_SCHEMA:
-        for character in first:
-            entry = (f"tag:yaml.org,2002:{name}", re.compile(rf"^(?:{pattern})$"))
-            found.setdefault(character.strip("\0"), []).append(entry)
-    return found
+_CORE_SCHEMA = {
+    "null": r"~|null|Null|NULL|",
+    "bool": r"true|True|TRUE|false|False|FALSE",
+    "int": r"[-+]?[0-9]+",
+    "float": r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)",
+}
+"""The types of the words that are no text, with their patterns: without 0x, 0o and dates."""
 
 
 class _Refused(MarkedYAMLError):
@@ -68,7 +55,11 @@ class _CoreResolver(VersionedResolver):
     """The types of `_CORE_SCHEMA`, whatever version a `%YAML` directive asks for."""
 
     processing_version = (1, 2)
-    versioned_resolver = _by_first_character()
+    versioned_resolver: ClassVar = {  # of words with any first character
+        None: [
+            (f"tag:yaml.org,2002:{n}", re.compile(f"^(?:{p})$")) for n, p in _CORE_SCHEMA.items()
+        ]
+    }
 
 
 class _PlainComposer(Composer):
