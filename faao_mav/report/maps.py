@@ -24,10 +24,10 @@ from faao_mav.report.style import (
     label,
     legend_above,
     mark_stations,
+    write_beside,
 )
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.schedule.schedule import positions_at
 from faao_mav.schedule.transit import way_home, way_out
 from faao_mav.vector import lengths
 
@@ -45,13 +45,8 @@ _PIECES = 240  # pieces of the route with a colour each, at most: more cannot be
 _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
 _SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
 
-_SIZE = 8.0  # height of a number, points
-_DIGIT = 0.66  # width of a digit in the widest usual font, of its size
-_GAP = 5.0  # points between a waypoint and its number
-_CLEAR = 2.5  # points between a number and the middle of a line: half the width of a route's line
-_MARK = 4.0  # half of a station's mark, points
-_SIDES = np.array([(1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)])
-"""Where a number may stand beside its waypoint, right and up of it, the first that is free."""
+_BESIDE = 9.0  # points from a waypoint to the middle of its number; chosen: clear of a route's line
+_APART = 0.045  # least distance of two waypoints with numbers, of what is shown; chosen to be read
 
 
 def route_map(
@@ -63,8 +58,7 @@ def route_map(
 ) -> None:
     """Draw the map on `plot`: east and north in metres, speeds as colours with a bar.
 
-    It shows all of the flight and both stations, and of a wider fence what is near them. It is
-    drawn when all else in its figure is, for the waypoints' numbers are fitted in.
+    It shows all of the flight and both stations, and of a wider fence what is near them.
     """
     radio, origin = solution.plan.radio, solution.plan.origin
     stations = np.array([radio.base_station.position, radio.ground_user.position])
@@ -89,9 +83,9 @@ def route_map(
         for way, name in zip(lines[2:], ("from and to home", None), strict=False):
             plot.plot(*way.T, color=MUTED, linewidth=0.9, label=name)
         _draw_waypoints(plot, places, "waypoint")
-    mark_stations(plot, list(marked))
     _show_all(plot, np.concatenate([*lines, *real, stations, places]), outlines, title)
-    _write_numbers(plot, numbers, places, [*lines, *real], stations)
+    _write_numbers(plot, numbers, places)
+    mark_stations(plot, list(marked))  # their names above the numbers
 
 
 def mission_map(mission: Mission, track: Track) -> "Figure":
@@ -108,7 +102,7 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
         plot.plot(*flown.T, color=SERIES[0], label="predicted")
         _draw_waypoints(plot, places, "item")
         _show_all(plot, np.concatenate([flown, places]), outlines)
-        _write_numbers(plot, numbers, places, [flown], np.empty((0, 2)))
+        _write_numbers(plot, numbers, places)
     return figure
 
 
@@ -207,52 +201,16 @@ def _outlines_of(fence: Fence, frame: LocalFrame) -> list[_Outline]:
     return [(ring, area.inclusion) for area in areas for ring in area.rings()]
 
 
-def _write_numbers(
-    plot: "Axes", numbers: Sequence[int], places: Real, lines: Sequence[Real], marks: Real
-) -> None:
-    """Write `numbers` beside their `places` (k, 2), m, on a map on which all else is drawn.
+def _write_numbers(plot: "Axes", numbers: Sequence[int], places: Real) -> None:
+    """Write `numbers` beside their `places` (k, 2), m, on a map of which the limits are known.
 
-    A number stands clear of the `lines` (n, 2), m, of the `marks` (j, 2), m, of texts and of other
-    numbers. Where that leaves it no room, it is left out.
+    A number stands right of the way. Where one is near already, it is left out.
     """
-    figure = plot.get_figure(root=True)
-    if figure is None or not numbers:
-        return
-    from matplotlib.transforms import Bbox
-
-    figure.draw_without_rendering()  # the scale of the map is known only now
-    points = 72.0 / figure.dpi
-
-    def on_paper(at: Real) -> Real:
-        return np.asarray(plot.transData.transform(at) * points)
-
-    paper = Bbox(plot.get_window_extent().get_points() * points)
-    taken = [Bbox(text.get_window_extent().get_points() * points) for text in plot.texts]
-    taken += [Bbox([mark - _MARK, mark + _MARK]) for mark in on_paper(marks)]
-    occupied = np.concatenate([_dense(on_paper(line)) for line in lines])
-    for number, place, at in zip(numbers, places.tolist(), on_paper(places), strict=True):
-        size = np.array([_DIGIT * _SIZE * len(str(number)), _SIZE])
-        for side in _SIDES:
-            shift = side * (size / 2 + (_GAP if 0 in side else 0.6 * _GAP))
-            box = Bbox([at + shift - size / 2, at + shift + size / 2])
-            inside = paper.contains(*box.min) and paper.contains(*box.max)
-            crossed = box.padded(_CLEAR).count_contains(occupied) > 0
-            if inside and not crossed and not any(map(box.overlaps, taken)):
-                taken.append(box)
-                written = plot.annotate(
-                    str(number),
-                    place,
-                    xytext=shift,
-                    textcoords="offset points",
-                    ha="center",
-                    va="center",
-                    fontsize=_SIZE,
-                )
-                written.set_in_layout(False)  # the map stays as it was measured
-                break
-
-
-def _dense(line: Real) -> Real:
-    """Return points of `line` (n, 2) that are at most about a point apart."""
-    along = np.append(0.0, np.cumsum(lengths(np.diff(line, axis=0))))
-    return positions_at(np.linspace(0.0, along[-1], int(along[-1]) + 2), along, line)
+    least = _APART * np.ptp(plot.dataLim.get_points(), axis=0).max()
+    ways = np.gradient(places, axis=0) if len(places) > 1 else np.ones_like(places)
+    written = np.empty((0, 2))
+    for number, place, (east, north) in zip(numbers, places, ways, strict=True):
+        if not (lengths(written - place) < least).any():
+            written = np.vstack([written, place])
+            side = _BESIDE * np.array([north, -east]) / (float(np.hypot(east, north)) or 1.0)
+            write_beside(plot, str(number), place, side, fontsize=8, ha="center", va="center")

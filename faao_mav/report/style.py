@@ -118,14 +118,20 @@ def mark_stations(axes: "Axes", places: Sequence[tuple[str, tuple[float, float],
     """Mark (name, [east, north], marker) with their names beside them."""
     for name, (east, north), marker in places:
         axes.plot([east], [north], marker, color=INK, markersize=7, zorder=5)
-        axes.annotate(
-            name,
-            (east, north),
-            xytext=(7, 7),
-            textcoords="offset points",
-            zorder=6,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
-        )
+        write_beside(axes, name, (east, north), (7, 7))
+
+
+def write_beside(axes: "Axes", text: str, place: Any, offset: Any, **style: Any) -> None:
+    """Write `text` at an `offset`, points, from a `place` [east, north], legible over lines."""
+    axes.annotate(
+        text,
+        place,
+        xytext=offset,
+        textcoords="offset points",
+        zorder=6,
+        bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+        **style,
+    )
 
 
 def render(figure: "Figure", suffix: str) -> bytes:

@@ -90,13 +90,13 @@ def test_a_flight_that_ends_late_is_drawn_to_its_end() -> None:
     assert over == pytest.approx(found.solution.t[-1] + late, abs=0.2)
 
 
-def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen() -> None:
-    solution = flown().solution
+def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen(small_plan: MakePlan) -> None:
+    changes = {"flight.bound_first_acceleration": False, "optimizer.starts": ["straight"]}
+    solution = optimize(small_plan(changes))
     a = solution.a.copy()
     a[0] = (240.0, 0.0)
     _, acceleration = figures.motion(replace(solution, a=a)).axes
     assert acceleration.get_ylim()[1] < 10
-    assert [text.get_text() for text in acceleration.texts] == ["a(0): 240 m/s²"]
 
 
 def test_streams_add_up_to_the_power_and_the_strongest_is_first() -> None:
@@ -104,7 +104,7 @@ def test_streams_add_up_to_the_power_and_the_strongest_is_first() -> None:
     station, _ = figures.precoder_power(solution).axes
     first, second = (lines(station)[f"stream {k}"].get_ydata() for k in (1, 2))
     used = np.sum(np.abs(solution.P_B) ** 2, axis=(1, 2))
-    np.testing.assert_allclose((first + second) / 1e3, used)  # in mW
+    np.testing.assert_allclose(first + second, used)
     assert np.all(first >= second)
 
 
@@ -119,7 +119,7 @@ def test_precoders_for_every_draw_are_averaged(small_plan: MakePlan) -> None:
     station, _ = figures.precoder_power(solution).axes
     total = sum(lines(station)[f"stream {k}"].get_ydata() for k in (1, 2))
     used = np.sum(np.abs(solution.P_B) ** 2, axis=(-2, -1)).mean(axis=0)
-    np.testing.assert_allclose(total / 1e3, used)
+    np.testing.assert_allclose(total, used)
 
 
 def test_the_map_has_stations_waypoints_and_fence() -> None:
