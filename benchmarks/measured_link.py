@@ -1,0 +1,49 @@
+"""Print how well a fitted law tells the level of a height that it has not seen.
+
+    python benchmarks/measured_link.py --station LAT,LON,HEIGHT FLIGHT.csv FLIGHT.csv ...
+
+Each table is a flight at a height of its own, as `faao-mission link` reads them. Each in turn is
+left out, the law is fitted to the others, and its rms error on that flight stands beside that of
+d^-2, and beside the spread that the fit itself told.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from faao_mav.radio.fit import LinkFit, Samples, fit_link
+from faao_mav.radio.measured import read_measured
+
+
+def square_law(flights: list[Samples]) -> LinkFit:
+    """The fit of d^-2 with its level: what one leg of all that was measured gives."""
+    place = np.concatenate([each.place for each in flights])
+    level = np.concatenate([each.level for each in flights])
+    at = float(np.mean(level + 20 * np.log10(np.linalg.norm(place, axis=1))))
+    return LinkFit(at, 2.0, (), (), 0.0, 0.0, 0.0, 0.0, 1, 1, ())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--station", required=True)
+    parser.add_argument("tables", nargs="+", type=Path)
+    given = parser.parse_args()
+    station = tuple(map(float, given.station.split(",")))
+    flights = [read_measured(path, station).samples for path in given.tables]
+    print("left out, law, rms error dB: law, d^-2; spread told dB")
+    rows = []
+    for out, flight in enumerate(flights):
+        others = flights[:out] + flights[out + 1 :]
+        fit, seen = fit_link(others), flight.means(2.0)
+        plain = square_law([each.means(2.0) for each in others])
+        errors = [seen.level - law.gain_db(seen.place) for law in (fit, plain)]
+        rows.append([float(np.sqrt(np.mean(error**2))) for error in errors])
+        law = f"n {fit.exponent:.2f}, {len(fit.elevation)} terms"
+        print(f"{flight.source}: {law}: {rows[-1][0]:.2f}, {rows[-1][1]:.2f}; {fit.spread:.2f}")
+    mean, worst = np.mean(rows, axis=0), np.max(rows, axis=0)
+    print(f"mean {mean[0]:.2f}, {mean[1]:.2f}; at most {worst[0]:.2f}, {worst[1]:.2f}")
+
+
+if __name__ == "__main__":
+    main()
