@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
-from faao_mav.study.rows import StudyRow, spreads
+from faao_mav.study.rows import StudyRow, rates_by_place, spread
 from faao_mav.study.sweep import Value
 
 if TYPE_CHECKING:
@@ -115,9 +116,9 @@ def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> N
     at = list(rows[0].values).index(axis)
     for name, inside, shown, k in _series(rows, measure):
         points = sorted(
-            (float(values[at]), spread.mean, spread.deviation)
-            for (values, _), spread in spreads(inside, shown).items()
-            if spread is not None
+            (float(values[at]), fmean(rates), spread(rates))
+            for (values, _), rates in rates_by_place(inside, shown).items()
+            if rates
         )
         x, mean, deviation = np.array(points).reshape(-1, 3).T
         k %= len(SERIES)

@@ -164,35 +164,25 @@ MEASURES = ("R_avg", "delivered")
 """The fields of a row that are compared."""
 
 
-@dataclass(frozen=True, slots=True)
-class Spread:
-    """Mean and standard deviation (0 of a single seed) of a rate, bit/s/Hz, over `count` seeds."""
-
-    mean: float
-    deviation: float
-    count: int
-
-
-def spreads(
+def rates_by_place(
     rows: Sequence[StudyRow], measure: str
-) -> dict[tuple[tuple[str, ...], str], Spread | None]:
-    """Return the spread of `measure`, one of `MEASURES`, over seeds by values and scheme, in order.
+) -> dict[tuple[tuple[str, ...], str], list[float]]:
+    """Return `measure`, one of `MEASURES`, of all seeds by values and scheme, in order, bit/s/Hz.
 
-    The values are JSON: those of a position, a list or a mapping, can then be looked up. None: all
-    failed.
+    The values are JSON: those of a position, a list or a mapping, can then be looked up.
     """
-    groups: dict[tuple[tuple[str, ...], str], list[float]] = {}
+    found: dict[tuple[tuple[str, ...], str], list[float]] = {}
     for row in rows:
-        rates = groups.setdefault((tuple(map(json.dumps, row.values.values())), row.scheme), [])
+        rates = found.setdefault((tuple(map(json.dumps, row.values.values())), row.scheme), [])
         rate = getattr(row, measure)
         if rate is not None:
             rates.append(rate)
-    return {
-        place: Spread(fmean(rates), stdev(rates) if len(rates) > 1 else 0.0, len(rates))
-        if rates
-        else None
-        for place, rates in groups.items()
-    }
+    return found
+
+
+def spread(rates: Sequence[float]) -> float:
+    """Return the standard deviation of `rates`, 0 of a single one."""
+    return stdev(rates) if len(rates) > 1 else 0.0
 
 
 def comparison(rows: Sequence[StudyRow]) -> str:
@@ -213,10 +203,10 @@ def comparison(rows: Sequence[StudyRow]) -> str:
 def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
     varied = list(dict.fromkeys(key for row in rows for key in row.values))
     schemes = list(dict.fromkeys(row.scheme for row in rows))
-    found = spreads(rows, measure)
+    found = rates_by_place(rows, measure)
     lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
     for values in dict.fromkeys(values for values, _ in found):
-        cells = (_cell(found.get((values, scheme))) for scheme in schemes)
+        cells = (_cell(found.get((values, scheme), [])) for scheme in schemes)
         lines.append([*(value.strip('"') for value in values), *cells])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
@@ -229,7 +219,7 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
     ]
 
 
-def _cell(spread: Spread | None) -> str:
-    if spread is None:
+def _cell(rates: Sequence[float]) -> str:
+    if not rates:
         return "-"
-    return f"{spread.mean:.4f}" + (f" +- {spread.deviation:.4f}" if spread.count > 1 else "")
+    return f"{fmean(rates):.4f}" + (f" +- {spread(rates):.4f}" if len(rates) > 1 else "")

@@ -97,16 +97,13 @@ def _rows(
     """Run `cases`; yield their rows as they finish. With a `cluster` joblib is connected to it."""
     from joblib import Parallel, delayed, effective_n_jobs
 
-    if cluster is not None:
-        workers = Parallel(return_as="generator_unordered", batch_size=1)
-        yield from workers(delayed(run_case)(case) for case in cases)
-        return
     processes = min(effective_n_jobs(jobs), len(cases))  # no more than there is work for
-    if processes <= 1:
+    if cluster is None and processes <= 1:
         yield from map(run_case, cases)
         return
+    count = {"n_jobs": processes} if cluster is None else {}
     with apart_from_the_current_directory():
-        workers = Parallel(n_jobs=processes, return_as="generator_unordered", batch_size=1)
+        workers = Parallel(return_as="generator_unordered", batch_size=1, **count)
         yield from workers(delayed(run_case)(case) for case in cases)
 
 
