@@ -62,14 +62,14 @@ class Itinerary:
         self._plan, self._gate, self._tell, self._takes_off = plan, gate, tell, takes_off
         self.relay = Course.of(solution)
         first, last = self.relay.p[[0, -1]]
-        self._out = np.vstack([self._high(way_out(plan, first[:2])), first])
-        self._home = np.vstack([last, self._high(way_home(plan, last[:2]))])
-        path = np.vstack([np.zeros(3), self._out, self.relay.p, self._home])[:, :2]
-        if plan.keep_in is not None and not plan.keep_in.covers_path(path):
+        if plan.keep_in is not None and not plan.keep_in.covers_path(self.relay.p[:, :2]):
             raise InfeasibleError(
                 "the streamed flight leaves the plan's fence where it speeds up before flight.start"
                 " or slows down after flight.end: give hover for both, or move them"
             )
+        way_out(plan, first[:2])  # raises
+        home = np.vstack([last[:2], way_home(plan, last[:2])])
+        self._ends = {"out": first, "back": self._high(home)[-1]}
         self.part: Part = "take-off"
         self.relay_start: float | None = None
         self.trouble: str | None = None
@@ -89,14 +89,14 @@ class Itinerary:
             case "take-off" if self._takes_off and (low or abs(velocity[2]) >= _LEVEL):
                 return None
             case "take-off":
-                self._enter("out", self._level_way(place, self._out), t)
+                self._enter("out", t, place)
             case "out" if self._rests(t, place, velocity):
                 self.relay_start = t - self.relay.begin
-                self._enter("relay", None, t)
+                self._enter("relay", t, place)
             case "relay" if self._plans(t) >= max(self.relay.end, self._plan.flight.duration):
-                self._enter("back", self._way(self._home), t)
+                self._enter("back", t, self.relay.p[-1])
             case "back" if self._arrived is not None and (
-                np.linalg.norm(place - self._home[-1]) <= NEAR or self._is_late(t)
+                np.linalg.norm(place - self._ends["back"]) <= NEAR or self._is_late(t)
             ):
                 self.part = "over"
                 self._tell(_TOLD["over"])
@@ -107,10 +107,12 @@ class Itinerary:
         assert self.relay_start is not None
         return t - self.relay_start
 
-    def _enter(self, part: Part, way: Course | None, t: float) -> None:
+    def _enter(self, part: Part, t: float, begin: Real) -> None:
+        """Begin a part, with its way from where it begins."""
         self.part, self._led = part, False
         self._tell(_TOLD[part])
-        self._follow(way, t)
+        end = self._ends.get(part)
+        self._follow(None if end is None else self._way_to(begin, end), t)
 
     def _follow(self, way: Course | None, t: float) -> None:
         """Follow `way` from its beginning; None: the plan."""
@@ -167,7 +169,7 @@ class Itinerary:
     def _leading(self, t: float, place: Real) -> Course | None:
         """Return a way to the end of the part, or to the plan, that is there no sooner; or None."""
         if self.part != "relay":
-            return self._way_to(place, self._out[-1] if self.part == "out" else self._home[-1])
+            return self._way_to(place, self._ends["out" if self.part == "out" else "back"])
         now = self._meets = self._plans(t)
         while self._meets < self.relay.end:
             meeting = self.relay.at(self._meets).position
@@ -186,18 +188,16 @@ class Itinerary:
         return np.column_stack([corners, np.full(len(corners), self._plan.flight.altitude)])
 
     def _way_to(self, place: Real, end: Real) -> Course | None:
-        """Return the way from `place` (3,) to `end` (3,) inside the fence; None: there is none."""
+        """Return the way from `place` (3,) to `end` (3,) inside the fence; None: there is none.
+
+        It leads up or down to the plan's height first.
+        """
         corners = way_between(self._plan, place[:2], end[:2])
-        return None if corners is None else self._level_way(place, self._high(corners))
-
-    def _level_way(self, place: Real, corners: Real) -> Course:
-        """Return the way from `place` up or down to the plan's height, and over `corners`."""
-        return self._way(np.vstack([place, self._high(place[None, :2]), corners]), CLIMB)
-
-    def _way(self, places: Real, *first: tuple[float, float]) -> Course:
-        """Return the way over `places`, with limits of its own for the first legs."""
+        if corners is None:
+            return None
         limits = self._speed, self._plan.vehicle.max_acceleration
-        return Course.through(places, [*first, *[limits] * (len(places) - 1 - len(first))])
+        places = np.vstack([place, self._high(corners)])
+        return Course.through(places, [CLIMB, *[limits] * (len(corners) - 1)])
 
     @property
     def _speed(self) -> float:
@@ -207,7 +207,7 @@ class Itinerary:
 
     def _rests(self, t: float, place: Real, velocity: Real) -> bool:
         """Tell whether the aircraft rests where the relay flight begins, or takes too long."""
-        away, speed = np.linalg.norm(place - self._out[-1]), np.linalg.norm(velocity)
+        away, speed = np.linalg.norm(place - self._ends["out"]), np.linalg.norm(velocity)
         if self._arrived is None or away > _SETTLED or speed > _STILL:
             self._settled = None
         else:
