@@ -12,7 +12,7 @@ from faao_mav.wire.messages import CommandAck, CommandLong, Heartbeat, Message, 
 from faao_mav.wire.protocol import LOCAL_POSITION, MavCommand, command_result
 from faao_mav.wire.transfer.exchange import Peer
 
-_ACCEPTED, _IN_PROGRESS = 0, 5
+ACCEPTED, _IN_PROGRESS = 0, 5
 """MAV_RESULT."""
 
 _LISTEN = 2.0
@@ -140,23 +140,23 @@ class Start(Watch):
         return ()
 
     def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
-        """Go on, or end, now that an order is answered."""
+        """Go on, or end, now that an order is answered.
+
+        Arming that is denied is not asked for again: what is said about it is waited for.
+        """
         order.answer = f"answers {order.command.name} with {command_result(result)}"
-        if result == _ACCEPTED:
-            return self._accepted(now)
-        order.refusals += 1
-        if self.phase == "disarming" and order.refusals == _TRIES:
-            self._leave_armed(f"it {order.answer}")
-        if self.phase == "arming":
-            self._not_armed(order, now)
-        return self._refused(order, now) if self.phase == "starting" else ()
-
-    def _accepted(self, now: float) -> Sequence[Message]:
-        return self._start(now) if self.phase == "arming" else ()
-
-    def _not_armed(self, order: Order, now: float) -> None:
-        """Ask no more, now that arming is denied, and end when it has said why."""
-        order.sent, order.due = _TRIES, now + _WORDS
+        accepted = result == ACCEPTED
+        order.refusals += not accepted
+        match self.phase:
+            case "arming" if accepted:
+                return self._start(now)
+            case "arming":
+                order.sent, order.due = _TRIES, now + _WORDS
+            case "starting" if not accepted:
+                return self._refused(order, now)
+            case "disarming" if order.refusals == _TRIES:
+                self._leave_armed(f"it {order.answer}")
+        return ()
 
     def _begin(self) -> None:
         self._order = None

@@ -12,7 +12,7 @@ from faao_mav.fly.gate import LEVEL, Gate
 from faao_mav.fly.itinerary import Itinerary
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.start import Order, Start
+from faao_mav.fly.start import ACCEPTED, Order, Start
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.wire.messages import (
@@ -153,20 +153,17 @@ class Stream(Start):
         self.phase = "starting"
         return self._say(now, MavCommand.TAKEOFF, *[0.0] * 6, self._height)
 
-    def _accepted(self, now: float) -> Sequence[Message]:
-        if self.phase == "starting":
-            self._begin()
-        return super()._accepted(now)
+    def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
+        """Take note of a take-off, and ask to arm again for a while.
 
-    def _not_armed(self, order: Order, now: float) -> None:
-        """Ask again for a while: in this mode it may need what its checks did not ask for before.
-
-        That is a position above all.
+        In this mode it may need what its checks did not ask for before, a position above all.
         """
-        if now < self._begun + self._patience:
-            order.sent = 0
-        else:
-            super()._not_armed(order, now)
+        if self.phase == "starting" and result == ACCEPTED:
+            self._begin()
+        due, out = order.due, super()._answered(order, result, now)
+        if self.phase == "arming" and result != ACCEPTED and now < self._begun + self._patience:
+            order.sent, order.due = 0, due
+        return out
 
     def _begin(self) -> None:
         self.phase, self._order = "flying", None
