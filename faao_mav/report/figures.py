@@ -176,7 +176,7 @@ def _speed(solution: Solution, conversion: Conversion | None) -> _Plot:
         schedule = conversion.schedule
         track = schedule.track()
         t = track["predicted_t"]
-        over = solution.t[-1] + max(0.0, schedule.clock.late(schedule.flown))
+        over = solution.t[-1] + max(0.0, schedule.late)
         inside = (t >= solution.t[0]) & (t <= over)
         curves["predicted"] = t[inside], lengths(track["predicted_v"])[inside]
     limits = {"v_max": vehicle.max_speed}

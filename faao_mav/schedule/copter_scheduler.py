@@ -87,7 +87,7 @@ class CopterScheduler(Scheduler):
         The leg that is off the most comes first.
         """
         route = schedule.route
-        off = lengths(schedule.positions(self.t - self.t[0]) - self.w)
+        off = lengths(schedule.positions(self.t) - self.w)
         splits = []
         for k in range(route.first, route.last):
             inside = np.flatnonzero(

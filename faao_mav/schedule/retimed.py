@@ -65,18 +65,16 @@ class Retimed(ABC):
     limits: Real
 
     def __init__(self, schedule: Schedule) -> None:
-        route, flown, clock = schedule.route, schedule.flown, schedule.clock
+        route, flown = schedule.route, schedule.flown
         self._waits, self._lead = route.waits, route.lead
-        self._leads = float(clock.leaving)
         self._t, self._places = flown.t[::_STRIDE], flown.position[::_STRIDE, :2]
         self._steps = np.diff(self._places, axis=0)
         self._leg = np.searchsorted(flown.departures[1:-1], self._t, side="right")
         self._left = (self._t[:, None] > flown.departures).astype(float)
         # the samples at which the clocks of plan and flight meet, and with which the flight is over
-        self._start, self._late = clock.start(flown), clock.late(flown)
-        meeting = self._start + clock.at - route.lead * self._leads
-        over = self._start + clock.t[-1] + self._late
-        found = np.searchsorted(self._t, [meeting, over])
+        self._start, self._late = schedule.start, schedule.late
+        over = self._start + schedule.t[-1] + self._late
+        found = np.searchsorted(self._t, [schedule.met, over])
         self._met, self._over = np.minimum(found, len(self._t) - 1).tolist()
 
     @abstractmethod
@@ -90,7 +88,7 @@ class Retimed(ABC):
     def at(self, t: Real, route: Route) -> Retiming:
         """Return the flight with the commands of `route` at the plan's times `t` (n,), s."""
         delays = self._later(route.speeds) + self._left @ (route.waits - self._waits)
-        ahead = (route.lead - self._lead) * self._leads
+        ahead = route.lead - self._lead
         clock = np.maximum.accumulate(self._t + delays) - (
             self._start + float(delays[self._met]) + ahead
         )
@@ -119,7 +117,7 @@ class Retimed(ABC):
             [
                 later[rows] - later[self._met],
                 self._left[rows] - self._left[self._met],
-                np.full((len(rows), 1), -self._leads),
+                np.full((len(rows), 1), -1.0),
             ]
         )
 

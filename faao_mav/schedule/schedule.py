@@ -43,52 +43,47 @@ class Deviation:
     late: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Clock:
-    """The plan's times and positions, and when the clock of a flight meets the plan's.
-
-    The plan is at `w` (n, 2), m, at `t` (n,), s. It reads `at`, s, when the aircraft passes
-    waypoint `waypoint` of its route or, with `leaving`, `lead` seconds after the aircraft leaves
-    it: an aircraft that starts from a hover takes longer to move than a plan does. The flight is
-    over when the aircraft is within `tolerance` m of the plan's end.
-    """
-
-    t: Real
-    w: Real
-    waypoint: int
-    at: float
-    leaving: bool
-    tolerance: float
-    lead: float = 0.0
-
-    def start(self, flown: Flown) -> float:
-        """Return the time of `flown`, s, at which the plan's clock reads 0."""
-        if self.leaving:
-            return float(flown.departures[self.waypoint]) + self.lead - self.at
-        about = float(flown.arrivals[self.waypoint])
-        return passing(flown.t, flown.position[:, :2], self.w[0], about) - self.at
-
-    def late(self, flown: Flown) -> float:
-        """Return by how much later than planned `flown` is over, s."""
-        t = flown.t - self.start(flown)
-        return lateness(self.t, self.w, t, flown.position[:, :2], self.tolerance)
-
-    def positions(self, flown: Flown, t: Real) -> Real:
-        """Return where the aircraft is at the plan's times `t` (k,), s: (k, 2), m."""
-        return positions_at(t + self.start(flown), flown.t, flown.position[:, :2])
-
-
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """A route with its predicted flight; `clock` ties the flight's time to the plan's."""
+    """A route with its predicted flight, beside the plan: it is at `w` (n, 2), m, at `t` (n,), s.
+
+    The flight is over when the aircraft is within `tolerance` m of the plan's end.
+    """
 
     route: Route
     flown: Flown
-    clock: Clock
+    t: Real
+    w: Real
+    tolerance: float
+
+    @cached_property
+    def met(self) -> float:
+        """The time of `flown`, s, at which the aircraft leaves or, after a run-in, passes w_I."""
+        first, flown = self.route.first, self.flown
+        if first == 0:
+            return float(flown.departures[0])
+        return passing(flown.t, flown.position[:, :2], self.w[0], float(flown.arrivals[first]))
+
+    @property
+    def start(self) -> float:
+        """The time of `flown`, s, at which the plan's clock reads 0.
+
+        An aircraft that starts from a hover takes longer to move than a plan does: it leaves by
+        the route's lead before the plan.
+        """
+        route = self.route
+        planned = route.arrivals[route.first] if route.first else route.departures[0]
+        return self.met + route.lead - float(planned)
+
+    @cached_property
+    def late(self) -> float:
+        """By how much later than planned the flight is over, s."""
+        t, w = self.flown.t - self.start, self.flown.position[:, :2]
+        return lateness(self.t, self.w, t, w, self.tolerance)
 
     def positions(self, t: Real) -> Real:
         """Return where the aircraft is predicted to be at the plan's times `t` (k,), (k, 2)."""
-        return self.clock.positions(self.flown, t)
+        return positions_at(t + self.start, self.flown.t, self.flown.position[:, :2])
 
     def track(self) -> dict[str, Real]:
         """Return the predicted relay flight on the plan's clock, as `--save` keeps it.
@@ -96,7 +91,7 @@ class Schedule:
         `predicted_t` (k,), s; `predicted_w` and `predicted_v` (k, 2), east and north, m and m/s.
         """
         return {
-            "predicted_t": self.flown.t - self.clock.start(self.flown),
+            "predicted_t": self.flown.t - self.start,
             "predicted_w": self.flown.position[:, :2],
             "predicted_v": self.flown.velocity[:, :2],
         }
@@ -104,9 +99,8 @@ class Schedule:
     @cached_property
     def deviation(self) -> Deviation:
         """How far the predicted flight is from the plan."""
-        t, w = self.flown.t - self.clock.start(self.flown), self.flown.position[:, :2]
-        clock = self.clock
-        return deviation(clock.t, clock.w, t, w, clock.tolerance, stride=_PATH_STRIDE)
+        t, w = self.flown.t - self.start, self.flown.position[:, :2]
+        return deviation(self.t, self.w, t, w, self.tolerance, stride=_PATH_STRIDE)
 
     @property
     def error(self) -> float:
@@ -116,7 +110,7 @@ class Schedule:
     @property
     def cost(self) -> float:
         """What the schedulers minimise, m: `error` and the weighted path error beyond its share."""
-        beyond = self.deviation.path - _PATH_SHARE * self.clock.tolerance
+        beyond = self.deviation.path - _PATH_SHARE * self.tolerance
         return self.error + _PATH_WEIGHT * max(0.0, beyond)
 
 

@@ -14,7 +14,7 @@ from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.retimed import LegRetimed, Retimed
 from faao_mav.schedule.route import Route, sent_speeds
-from faao_mav.schedule.schedule import Clock, Schedule, positions_at
+from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
 from faao_mav.vector import lengths
 
@@ -71,7 +71,7 @@ class Scheduler(ABC):
         route = self._with_radii(route.rounded())
         whole_seconds = self.vehicle.type.whole_second_holds
         path = route.path(whole_seconds=whole_seconds, altitude=self.altitude, wind=self.wind)
-        return Schedule(route, self.model.fly(path), self._clock(route))
+        return Schedule(route, self.model.fly(path), self.t, self.w, self.tolerance)
 
     def fitted(
         self,
@@ -153,8 +153,8 @@ class Scheduler(ABC):
 
     def _lasting(self, route: Route, schedule: Schedule) -> Route:
         """Return `route`, flown like `schedule`, with a wait to the end of the plan's last slot."""
-        lasting = self.t[-1] - self.t[0] + self.t[-1] - self.t[-2]
-        early = lasting + schedule.clock.start(schedule.flown) - schedule.flown.arrivals[-1]
+        end = 2 * self.t[-1] - self.t[-2]
+        early = end + schedule.start - schedule.flown.arrivals[-1]
         last_wait = max(SHORTEST_HOLD, np.ceil(early))
         return replace(route, waits=np.append(route.waits[:-1], last_wait))
 
@@ -167,20 +167,6 @@ class Scheduler(ABC):
         room = np.minimum(leg_lengths[:-1], leg_lengths[1:])
         radii = self.model.radii(room, route.turns, stops)
         return replace(route, radii=np.round(radii, 1))
-
-    def _clock(self, route: Route) -> Clock:
-        """Return the clock by which the plan and the flight of `route` meet at w_I."""
-        leaving = route.first == 0
-        times = route.departures if leaving else route.arrivals
-        return Clock(
-            t=self.t - self.t[0],
-            w=self.w,
-            waypoint=route.first,
-            at=times[route.first] - self.t[0],
-            leaving=leaving,
-            tolerance=self.tolerance,
-            lead=route.lead,
-        )
 
 
 def _speed_groups(speeds: Real, alike: float) -> Integers:

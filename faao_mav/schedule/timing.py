@@ -18,7 +18,7 @@ from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.errors import InputError
 from faao_mav.schedule.retimed import LegRetimed, Retimed, Retiming
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import LATE_WEIGHT, Clock, Schedule
+from faao_mav.schedule.schedule import LATE_WEIGHT, Schedule
 
 MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
@@ -60,7 +60,7 @@ def fit(
     unknowns = _Unknowns(route, groups, free, min_speed, max_speed)
     x = unknowns.initial
     best = begun or flight(unknowns.commanded(x))
-    goal = _Goal(best.clock)
+    goal = _Goal(best.t, best.w)
     cost = goal.cost(best)
     for _ in range(flights - 1):
         tried, foreseen = _stepped(goal, unknowns, retime(best), x)
@@ -120,17 +120,16 @@ class _Unknowns:
 
 
 class _Goal:
-    """The residuals whose sum of squares is least for a flight that keeps the plan of `clock`."""
+    """The residuals whose sum of squares is least for a flight at `w` (n, 2), m, at `t` (n,), s."""
 
-    def __init__(self, clock: Clock) -> None:
-        samples = np.unique(np.linspace(0, len(clock.t) - 1, _SAMPLES).astype(int))
-        self.t, self._w = clock.t[samples], clock.w[samples]
+    def __init__(self, t: Real, w: Real) -> None:
+        samples = np.unique(np.linspace(0, len(t) - 1, _SAMPLES).astype(int))
+        self.t, self._w = t[samples], w[samples]
         self._weight = 1 / np.sqrt(len(samples))
 
     def cost(self, schedule: Schedule) -> float:
         """Return the sum of squares, m², of a flight."""
-        late = schedule.clock.late(schedule.flown)
-        residuals = self._residuals(schedule.positions(self.t), late)
+        residuals = self._residuals(schedule.positions(self.t), schedule.late)
         return float(residuals @ residuals)
 
     def residuals(self, found: Retiming) -> Real:

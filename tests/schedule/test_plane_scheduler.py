@@ -77,7 +77,7 @@ def test_the_path_is_kept_where_plain_waypoints_would_lose_it(
     assert found.path < 6
     assert found.path < 0.7 * followed_unmoved(t, w, plane_plan())
     assert found.rms < 5
-    assert abs(conversion.schedule.clock.late(conversion.schedule.flown)) < 0.5
+    assert abs(conversion.schedule.late) < 0.5
 
 
 def test_a_change_of_speed_begins_before_the_plans() -> None:
@@ -110,8 +110,7 @@ def test_the_whole_mission_flies_like_its_schedule(
         k for k, item in enumerate(conversion.mission.items) if item.command == Command.NAV_WAYPOINT
     ]
     passed = track.reached[waypoints[schedule.route.first]]
-    clock = schedule.clock
-    start = passed + clock.start(schedule.flown) - schedule.flown.arrivals[schedule.route.first]
+    start = passed + schedule.start - schedule.flown.arrivals[schedule.route.first]
     at = np.stack([np.interp(t + start, track.t, x) for x in track.position.T[:2]], axis=-1)
     assert np.hypot(*(at - schedule.positions(t)).T).max() < 3
 

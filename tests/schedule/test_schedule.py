@@ -215,9 +215,7 @@ def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) 
     route, flown = conversion.schedule.route, conversion.schedule.flown
     passed = whole.reached[waypoints]
     assert np.diff(passed[:-1]) == pytest.approx(np.diff(flown.departures[:-1]), abs=0.25)
-    start = passed[route.first] - (
-        flown.departures[route.first] - conversion.schedule.clock.start(flown)
-    )
+    start = passed[route.first] - (flown.departures[route.first] - conversion.schedule.start)
     planned = np.stack([np.interp(t + start, whole.t, x) for x in whole.position.T[:2]], axis=-1)
     apart = np.hypot(*(planned - conversion.schedule.positions(t)).T)
     assert apart.max() < 2.0  # 0.2 s: the mission leaves w_I from a hold, the schedule from rest

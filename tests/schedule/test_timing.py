@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from faao_mav.autopilot import Flown
 from faao_mav.autopilot.ardupilot.copter import ArduCopter
 from faao_mav.errors import InputError
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Clock, Schedule, lateness
+from faao_mav.schedule.schedule import Schedule, lateness
 from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD, fit
 
 MODEL = ArduCopter(acceleration=4, jerk=10)
@@ -40,16 +41,20 @@ def flown(route: Route) -> Flown:
     return MODEL.fly(route.path(whole_seconds=True))
 
 
-def plan_of(route: Route, *, ahead: float = 0.0) -> Clock:
+Plan: TypeAlias = tuple[Real, Real, float]
+"""Times, s, and positions, m, of a plan, and the path tolerance, m."""
+
+
+def plan_of(route: Route, *, ahead: float = 0.0) -> Plan:
     """The flight of `route` as a plan whose clock starts `ahead` seconds into it."""
     flight = flown(route)
     t = np.arange(0.0, flight.departures[-1] - ahead, 0.2)
     w = np.stack([np.interp(t + ahead, flight.t, x) for x in flight.position.T[:2]], axis=-1)
-    return Clock(t=t, w=w, waypoint=0, at=0.0, leaving=True, tolerance=2.0)
+    return t, w, 2.0
 
 
 def fitted(
-    clock: Clock,
+    plan: Plan,
     begin: Route,
     *,
     groups: list[int] | None = None,
@@ -57,7 +62,7 @@ def fitted(
     max_speed: float = 8.0,
 ) -> Schedule:
     return fit(
-        lambda route: Schedule(route, flown(route), replace(clock, lead=route.lead)),
+        lambda route: Schedule(route, flown(route), *plan),
         begin,
         groups=np.array(groups if groups is not None else range(len(begin.speeds))),
         free=(begin.waits > 0) & (np.arange(len(begin.waits)) != len(begin.waits) - 1),
@@ -67,8 +72,8 @@ def fitted(
 
 
 def test_the_speeds_and_holds_that_made_a_flight_are_found() -> None:
-    clock = plan_of(route_with(SPEEDS, WAITS))
-    found = fitted(clock, route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS)))
+    plan = plan_of(route_with(SPEEDS, WAITS))
+    found = fitted(plan, route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS)))
     assert found.route.speeds == pytest.approx(SPEEDS, abs=0.1)
     assert found.route.waits == pytest.approx(WAITS, abs=0.5)
     assert found.route.lead == pytest.approx(0, abs=0.1)
@@ -85,20 +90,20 @@ def test_a_flight_is_found_from_any_beginning(
     made: list[float], hold: float, begin: list[float]
 ) -> None:
     waits = np.array([0.0, 0.0, hold, 0.0, 3.0])
-    clock = plan_of(route_with(np.array(made), waits))
+    plan = plan_of(route_with(np.array(made), waits))
     guess = route_with(np.array(begin), np.array([0.0, 0.0, 8.0, 0.0, 3.0]))
-    before = Schedule(guess, flown(guess), clock).deviation.rms
-    assert fitted(clock, guess).deviation.rms < max(0.6, 0.1 * before)
+    before = Schedule(guess, flown(guess), *plan).deviation.rms
+    assert fitted(plan, guess).deviation.rms < max(0.6, 0.1 * before)
 
 
 def test_a_flight_without_an_end_is_not_the_one_that_fits() -> None:
-    clock = plan_of(route_with(SPEEDS, WAITS))
+    plan = plan_of(route_with(SPEEDS, WAITS))
     begin = route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS))
 
     def flight(route: Route) -> Schedule:
         if not np.allclose(route.speeds, begin.speeds):
             raise InputError("the flight would take more than 21600 s")
-        return Schedule(route, flown(route), clock)
+        return Schedule(route, flown(route), *plan)
 
     found = fit(
         flight,
@@ -112,12 +117,12 @@ def test_a_flight_without_an_end_is_not_the_one_that_fits() -> None:
 
 
 def test_a_fit_takes_few_flights() -> None:
-    clock = plan_of(route_with(SPEEDS, WAITS))
+    plan = plan_of(route_with(SPEEDS, WAITS))
     flights = []
 
     def flight(route: Route) -> Schedule:
         flights.append(route)
-        return Schedule(route, flown(route), replace(clock, lead=route.lead))
+        return Schedule(route, flown(route), *plan)
 
     begin = route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS))
     fitting = partial(
@@ -129,7 +134,7 @@ def test_a_fit_takes_few_flights() -> None:
     flights.clear()
     rough = fitting(flights=2)
     assert len(flights) == 2
-    assert rough.deviation.rms < 0.3 * Schedule(begin, flown(begin), clock).deviation.rms
+    assert rough.deviation.rms < 0.3 * Schedule(begin, flown(begin), *plan).deviation.rms
 
 
 def test_setting_out_before_the_plan_is_found() -> None:
@@ -157,18 +162,17 @@ def test_a_flight_is_not_over_where_it_passes_its_end_on_the_way(slowness: float
 
 def test_how_late_a_flight_is_over() -> None:
     route = route_with(SPEEDS, WAITS)
-    clock, flight = plan_of(route), flown(route)
-    assert clock.late(flight) == pytest.approx(0, abs=0.01)
-    assert replace(clock, lead=0.7).late(flight) == pytest.approx(-0.7, abs=0.01)
+    plan, flight = plan_of(route), flown(route)
+    assert Schedule(route, flight, *plan).late == pytest.approx(0, abs=0.01)
+    assert Schedule(replace(route, lead=0.7), flight, *plan).late == pytest.approx(-0.7, abs=0.01)
     longer = flown(route_with(SPEEDS, WAITS + np.array([0, 0, 3, 0, 0])))
-    assert clock.late(longer) == pytest.approx(3, abs=0.05)
+    assert Schedule(route, longer, *plan).late == pytest.approx(3, abs=0.05)
 
 
 def test_a_flight_that_begins_at_speed_has_no_lead() -> None:
-    route = replace(route_with(SPEEDS, WAITS), first=1)
-    clock = plan_of(route, ahead=0.8)
-    passing = replace(clock, waypoint=1, at=float(flown(route).arrivals[1]) - 0.8, leaving=False)
-    assert fitted(passing, route).route.lead == 0
+    plain = route_with(SPEEDS, WAITS)
+    route = replace(plain, first=1, arrivals=flown(plain).arrivals - 0.8)
+    assert fitted(plan_of(route, ahead=0.8), route).route.lead == 0
 
 
 def test_legs_of_one_group_share_a_speed() -> None:
@@ -179,9 +183,9 @@ def test_legs_of_one_group_share_a_speed() -> None:
 
 
 def test_bounds_are_kept() -> None:
-    clock = plan_of(route_with(SPEEDS, WAITS))
+    plan = plan_of(route_with(SPEEDS, WAITS))
     begin = route_with(np.full(4, 5.0), WAITS)
-    speeds = fitted(clock, begin, min_speed=3.5, max_speed=5.5).route.speeds
+    speeds = fitted(plan, begin, min_speed=3.5, max_speed=5.5).route.speeds
     assert speeds.min() >= 3.5
     assert speeds.max() <= 5.5
     assert speeds[[0, 3]] == pytest.approx([5.5, 3.5])
@@ -197,5 +201,5 @@ def test_a_hold_stays_one() -> None:
 
 def test_one_point_has_nothing_to_fit() -> None:
     route = route_with(np.zeros(0), np.array([7.0]))
-    found = fitted(Clock(np.arange(5.0), np.zeros((5, 2)), 0, 0.0, True, 2.0), route)
+    found = fitted((np.arange(5.0), np.zeros((5, 2)), 2.0), route)
     assert (len(found.route.speeds), found.route.waits.tolist(), found.route.lead) == (0, [7], 0)
