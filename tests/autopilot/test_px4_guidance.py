@@ -8,28 +8,16 @@ from hypothesis import strategies as st
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.px4 import Px4
-from faao_mav.autopilot.px4.guidance import GuidedLeg, headed, legs
-from faao_mav.autopilot.px4.smoothing import Axis, follow
+from faao_mav.autopilot.px4.guidance import Axis, GuidedLeg, follow, headed, legs
 
 SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
-
-JERK = 4.0
-LIMIT = 3.0
-
-AXES = st.lists(
-    st.tuples(
-        st.builds(Axis, st.just(0.0), st.floats(-9, 9), st.floats(-LIMIT, LIMIT)), st.floats(-9, 9)
-    ),
-    min_size=1,
-    max_size=3,
-)
 
 
 @pytest.fixture
 def leg() -> GuidedLeg:
     """A leg to the east from 0 to 50 m, whose end has a radius of 2 m."""
     points = np.array([[0.0, 0, 30], [50, 0, 30], [50, 60, 30]])
-    return legs(SUITED, points, [2.0, 2.0, 2.0], [8.0, 8.0], [0.0, 0.0, 0.0])[0]
+    return legs(SUITED, points, np.full(3, 2.0), np.full(2, 8.0), [0.0, 0.0, 0.0])[0]
 
 
 @pytest.mark.parametrize(
@@ -83,35 +71,37 @@ def test_radii_are_a_metre_at_least_and_none_narrows_in_a_corner(seed: int) -> N
     assert not any(narrowing(radii, turn, stops))
 
 
+AXES = st.lists(
+    st.tuples(st.builds(Axis, st.just(0.0), st.floats(-9, 9), st.floats(-3, 3)), st.floats(-9, 9)),
+    min_size=1,
+    max_size=3,
+)
+
+
 @given(AXES, st.floats(0.01, 0.1))
-def test_ramps_stay_within_limits(axes: list[tuple[Axis, float]], dt: float) -> None:
-    states, wanted = [axis for axis, _ in axes], [setpoint for _, setpoint in axes]
-    for axis, after in zip(
-        states, follow(states, wanted, [LIMIT] * len(axes), JERK, dt), strict=True
-    ):
+def test_ramps_stay_within_limits_and_end_together_at_what_was_asked_for(
+    axes: list[tuple[Axis, float]], dt: float
+) -> None:
+    states, wanted, limits = [a for a, _ in axes], [s for _, s in axes], [3.0] * len(axes)
+    for axis, after in zip(states, follow(states, wanted, limits, 4.0, dt), strict=True):
         change = after.acceleration - axis.acceleration
-        assert abs(after.acceleration) <= LIMIT + 1e-9
-        assert abs(change) <= JERK * dt + 1e-9
+        assert abs(after.acceleration) <= 3 + 1e-9
+        assert abs(change) <= 4 * dt + 1e-9
         gained = (axis.acceleration + change / 2) * dt
         assert after.velocity - axis.velocity == pytest.approx(gained, abs=1e-9)
         moved = (axis.velocity + axis.acceleration * dt / 2 + change * dt / 6) * dt
         assert after.position == pytest.approx(moved, abs=1e-9)
-
-
-@given(AXES)
-def test_ramps_end_together_at_what_was_asked_for(axes: list[tuple[Axis, float]]) -> None:
-    states, wanted = [axis for axis, _ in axes], [setpoint for _, setpoint in axes]
     for _ in range(200):
-        states = follow(states, wanted, [LIMIT] * len(axes), JERK, 0.1)
+        states = follow(states, wanted, limits, 4.0, 0.1)
     np.testing.assert_allclose([axis.velocity for axis in states], wanted, atol=1e-6)
     np.testing.assert_allclose([axis.acceleration for axis in states], 0, atol=1e-6)
 
 
 def test_one_axis_takes_the_shortest_time_and_others_as_long() -> None:
     # From rest to 4 m/s: 0.75 s of rising, 0.583 s at the limit, 0.75 s of falling acceleration.
-    whole = 2 * LIMIT / JERK + (4 - LIMIT * LIMIT / JERK) / LIMIT
-    states, steps = [Axis(0.0), Axis(0.0)], 400
+    whole, steps = 2 * 3 / 4 + (4 - 3 * 3 / 4) / 3, 400
+    states = [Axis(0.0), Axis(0.0)]
     for _ in range(steps - 4):
-        states = follow(states, [4.0, 1.0], [LIMIT, LIMIT], JERK, whole / steps)
+        states = follow(states, [4.0, 1.0], [3.0, 3.0], 4.0, whole / steps)
     assert 0 < 4 - states[0].velocity < 0.05
     assert 0 < 1 - states[1].velocity < 0.05

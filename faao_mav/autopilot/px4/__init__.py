@@ -1,11 +1,10 @@
 """PX4: what its multicopters and planes are, and how a multicopter flies a mission.
 
-The flight model is PX4's own chain: `detour` says where it heads on a leg, `guidance` asks for a
-velocity, `smoothing` follows it within jerk and acceleration, `response` is the aircraft that
-follows the smoothed trajectory, `step` takes these a moment further, and `simulation` flies leg
-after leg. Source: behaviour of PX4's modules navigator and flight_mode_manager (FlightTaskAuto) and
-its library motion_planning, read at several revisions about 1.16; controller gains are PX4's
-documented defaults. Flights: PX4 1.16 in simulation.
+The flight model is PX4's own chain: `guidance` asks for a velocity and follows it within jerk and
+acceleration, `flight_model` has the aircraft that follows that trajectory. Source: behaviour of
+PX4's modules navigator and flight_mode_manager (FlightTaskAuto) and its library motion_planning,
+read at several revisions about 1.16; controller gains are PX4's documented defaults. Flights: PX4
+1.16 in simulation.
 """
 
 import math

@@ -9,10 +9,11 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.flight_path import FlightPath, Flown
 from faao_mav.autopilot.px4.guidance import (
+    Axis,
     GuidedLeg,
     climb_setpoint,
     corner_speed,
-    fastest_climb,
+    follow,
     headed,
     legs,
     level_setpoint,
@@ -20,7 +21,6 @@ from faao_mav.autopilot.px4.guidance import (
     stopping_speed,
 )
 from faao_mav.autopilot.px4.parameters import Px4Limits
-from faao_mav.autopilot.px4.smoothing import Axis, follow
 from faao_mav.autopilot.stepper import STEP, Copter, Samples
 
 POSITION_GAIN = 0.95
@@ -126,8 +126,7 @@ class Px4(Px4Limits):
 
     def corner_speed(self, turn: float) -> float:
         """Return how fast it passes a waypoint where it turns by `turn`, rad, in m/s."""
-        radius = self.acceptance_radius
-        return corner_speed(self.corner_gain, self.acceleration, radius, cos(turn))
+        return corner_speed(self, self.acceptance_radius, cos(turn))
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -141,13 +140,8 @@ class Px4(Px4Limits):
         speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
         holds = (path.holds + path.delays).tolist()
-        route = legs(
-            self,
-            path.points,
-            np.maximum(radii, _NEAREST).tolist(),
-            np.minimum(speeds, self.max_speed).tolist(),
-            holds,
-        )
+        speeds, radii = np.minimum(speeds, self.max_speed), np.maximum(radii, _NEAREST)
+        route = legs(self, path.points, radii, speeds, holds)
         flight = _Flight(self, path)
         arrivals, departures = [0.0], [holds[0] + SWITCH_DELAY if holds[0] > 0 else 0.0]
         flight.time = departures[0]
@@ -206,36 +200,33 @@ class _Flight:
 
     def _move(self, leg: GuidedLeg, step: float) -> None:
         """Fly on for `step` s: what is asked for halfway is pursued all along it."""
-        limits, body, (east, north, up) = self._limits, self._body, self._axes
+        limits, body, axes = self._limits, self._body, self._axes
+        east, north, up = axes
         place = complex(east.position, north.position)
         velocity = complex(east.velocity, north.velocity)
-        midway = place + velocity * (step / 2)
-        aim = headed(limits, leg, body.place)
+        midway, aim = place + velocity * (step / 2), headed(limits, leg, body.place)
         direction, speed, self._remembered = level_setpoint(
             limits, aim, midway, velocity, self._remembered
         )
+        lag, (gain, integral, derivative) = place - body.place, VELOCITY_GAINS
+        self._pace = self._paced(lag, velocity)
         climb, most = 0.0, limits.acceleration
         if self._climbs:
             height = up.position + up.velocity * (step / 2)
             speed, climb = climb_setpoint(limits, aim, abs(aim.target - midway), height, speed)
-        wanted = direction * speed
-        lag = place - body.place
-        self._pace = self._paced(lag, velocity)
-        count = 3 if self._climbs else 2
-        self._axes[:count] = follow(
-            self._axes[:count],
+        wanted, count = direction * speed, 3 if self._climbs else 2
+        axes[:count] = follow(
+            axes[:count],
             (wanted.real, wanted.imag, climb)[:count],
-            (most, most, fastest_climb(limits, climb)[1])[:count],
+            (most, most, limits.vertical(climb)[1])[:count],
             limits.jerk,
             self._pace * step,
         )
-        later = self._axes
         push = complex(
-            east.acceleration + later[0].acceleration, north.acceleration + later[1].acceleration
+            east.acceleration + axes[0].acceleration, north.acceleration + axes[1].acceleration
         )
-        proportional, integral, derivative = VELOCITY_GAINS
         lack = velocity + POSITION_GAIN * lag - body.velocity
-        asked = push / 2 + proportional * lack + self._integral - derivative * body.acceleration
+        asked = push / 2 + gain * lack + self._integral - derivative * body.acceleration
         self._integral += integral * lack * step
         body.move(asked, step)
         self.time += step

@@ -1,10 +1,10 @@
-"""The velocity that PX4 asks for on its way along a leg."""
+"""The velocity that PX4 asks for on its way along a leg, and how its trajectory follows that."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import sqrt
-from typing import TypeVar
+from math import copysign, sqrt
+from typing import NamedTuple, TypeVar
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.px4.parameters import Px4Limits
@@ -66,26 +66,22 @@ def stopping_distance(jerk: float, acceleration: float, speed: _Speed) -> _Speed
     return speed * (speed + 4 * acceleration * acceleration / jerk) / (2 * acceleration)
 
 
-def corner_speed(gain: float, acceleration: float, radius: float, cosine: float) -> float:
+def corner_speed(limits: Px4Limits, radius: float, cosine: float) -> float:
     """Return how fast PX4 passes a waypoint of acceptance `radius`, m, where it turns, m/s.
 
     sqrt(g a R cot(θ/2)) with g = MPC_XY_TRAJ_P and `cosine` that of the turn θ.
     """
     half_turn = sqrt(max(1 + cosine, 0.0) / max(1 - cosine, 1e-9))
-    return sqrt(gain * acceleration * radius * half_turn)
+    return sqrt(limits.corner_gain * limits.acceleration * radius * half_turn)
 
 
-def unit(way: complex) -> complex:
+def _unit(way: complex) -> complex:
     """Return the direction of `way`, 0 for none."""
     return way / abs(way) if abs(way) > _TINY else 0j
 
 
 def legs(
-    limits: Px4Limits,
-    points: Real,
-    radii: Sequence[float],
-    speeds: Sequence[float],
-    holds: Sequence[float],
+    limits: Px4Limits, points: Real, radii: Real, speeds: Real, holds: Sequence[float]
 ) -> list[GuidedLeg]:
     """Return the legs between `points` (m, 3), m - 1 of them.
 
@@ -99,9 +95,9 @@ def legs(
     moves = [end - start for start, end in pairwise(places)] + [0j]
     rises = [end - start for start, end in pairwise(heights)] + [0.0]
     result = []
-    for k, speed in enumerate(speeds):
+    for k, (speed, radius) in enumerate(zip(speeds.tolist(), radii[1:].tolist(), strict=True)):
         following, holding = abs(moves[k + 1]), holds[k + 1] > 0
-        passable = following > 1e-3 and following >= radii[k + 1] and not holding
+        passable = following > 1e-3 and following >= radius and not holding
         climbs_on = rises[k] * rises[k + 1] > 0 and not holding
         ahead = stopping_speed(limits.jerk, limits.acceleration, following)
         result.append(
@@ -109,13 +105,13 @@ def legs(
                 origin=places[k],
                 target=places[k + 1],
                 height=heights[k + 1],
-                along=unit(moves[k]),
-                onward=unit(moves[k + 1]),
+                along=_unit(moves[k]),
+                onward=_unit(moves[k + 1]),
                 speed=speed,
-                radius=radii[k + 1],
+                radius=radius,
                 hold=max(holds[k + 1], 0.0),
                 exit_speed=min(ahead, speed) if passable else 0.0,
-                exit_climb=fastest_climb(limits, rises[k])[0] if climbs_on else 0.0,
+                exit_climb=limits.vertical(rises[k])[0] if climbs_on else 0.0,
             )
         )
     return result
@@ -134,7 +130,7 @@ def headed(limits: Px4Limits, leg: GuidedLeg, place: complex) -> GuidedLeg:
     if not leg.along:
         return leg
     if way.real > abs(leg.target - leg.origin):
-        return replace(leg, along=unit(leg.target - place))
+        return replace(leg, along=_unit(leg.target - place))
     if way.real < 0 and abs(way) > leg.radius:
         target = leg.origin
     elif abs(way.imag) > leg.radius:
@@ -144,9 +140,8 @@ def headed(limits: Px4Limits, leg: GuidedLeg, place: complex) -> GuidedLeg:
     following, exit_speed = abs(leg.target - target), 0.0
     if following >= leg.radius:
         exit_speed = min(stopping_speed(limits.jerk, limits.acceleration, following), leg.speed)
-    return replace(
-        leg, target=target, along=unit(target - place), onward=leg.along, exit_speed=exit_speed
-    )
+    along = _unit(target - place)
+    return replace(leg, target=target, along=along, onward=leg.along, exit_speed=exit_speed)
 
 
 def level_setpoint(
@@ -162,8 +157,7 @@ def level_setpoint(
     offset = leg.target - place
     distance = abs(offset) + _TINY
     direction = offset / distance
-    cosine = (direction * leg.onward.conjugate()).real
-    corner = corner_speed(limits.corner_gain, limits.acceleration, leg.radius, cosine)
+    corner = corner_speed(limits, leg.radius, (direction * leg.onward.conjugate()).real)
     passing = min(corner, leg.exit_speed)
     slowing = stopping_speed(limits.jerk, limits.acceleration, distance, passing)
     allowed, speed = min(leg.speed, slowing), abs(velocity)
@@ -174,15 +168,8 @@ def level_setpoint(
     if rest.real > 0:
         reach = max(leg.radius, _LOOKAHEAD)
         aim = complex(sqrt(max(reach * reach - rest.imag * rest.imag, 0.0)), rest.imag)
-        direction = unit(aim * leg.along)
+        direction = _unit(aim * leg.along)
     return direction, min(allowed, remembered), remembered
-
-
-def fastest_climb(limits: Px4Limits, rise: float) -> tuple[float, float]:
-    """Return the greatest speed, m/s, and acceleration, m/s², of a climb or descent by `rise` m."""
-    if rise > 0:
-        return limits.climb_speed, limits.climb_acceleration
-    return limits.descent_speed, limits.descent_acceleration
 
 
 def climb_setpoint(
@@ -194,9 +181,56 @@ def climb_setpoint(
     of the two directions holds up the other, for a straight line to the target.
     """
     rise = leg.height - height
-    fastest, acceleration = fastest_climb(limits, rise)
+    fastest, acceleration = limits.vertical(rise)
     left, distance = abs(rise) + _TINY, distance + _TINY
     climb = min(fastest, stopping_speed(limits.jerk, acceleration, left, leg.exit_climb))
     vertical = min(climb, max(speed, _SLOW) * left / distance)
     speed = min(speed, max(climb, _SLOW) * distance / left)
-    return speed, vertical if rise > 0 else -vertical
+    return speed, copysign(vertical, rise)
+
+
+class Axis(NamedTuple):
+    """Position, m, velocity, m/s, and acceleration, m/s², of the trajectory along one axis."""
+
+    position: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+def follow(
+    axes: Sequence[Axis],
+    setpoints: Sequence[float],
+    limits: Sequence[float],
+    jerk: float,
+    dt: float,
+) -> list[Axis]:
+    """Return the axes after `dt` s of pursuing the velocities `setpoints`, m/s, in step.
+
+    Every axis ramps its acceleration up, keeps it and ramps it down, by the `jerk` j, m/s³, with
+    `limits` as the greatest accelerations, m/s². With direction such that the velocity must rise,
+    acceleration a and velocity error e, q² = a²/2 + j e, an axis alone takes
+    T = (p + q²/p - a) / j with the peak p = min(q, limit). All take the longest T, so the peaks are
+    the roots p of p² - (j T + a) p + q² = 0; one that already accelerates more keeps that up. At
+    the end of the step an axis accelerates as much as it loses, by the jerk, until it is there.
+    """
+    ramps = []
+    for axis, setpoint, limit in zip(axes, setpoints, limits, strict=True):
+        a = axis.acceleration
+        rest = setpoint - axis.velocity - a * abs(a) / (2 * jerk)
+        start = a if rest >= 0 else -a
+        square = _TINY**2 + jerk * abs(rest) + max(start, 0.0) ** 2
+        peak = min(sqrt(square), limit)
+        ramps.append((start, square, peak + square / peak - start))
+    total = max([ramp[-1] for ramp in ramps])
+    after = []
+    for (position, velocity, a), setpoint, (start, square, _) in zip(
+        axes, setpoints, ramps, strict=True
+    ):
+        half, error = (total + start) / 2, setpoint - velocity - a * dt / 2
+        peak = max(square / (half + sqrt(max(half * half - square, 0.0))), start)
+        most = jerk * (sqrt(dt * dt + 2 * abs(error) / jerk) - dt)
+        change = copysign(min(peak, most), error) - a
+        change = min(max(change, -jerk * dt), jerk * dt)
+        moved = (velocity + a * dt / 2 + change * dt / 6) * dt
+        after.append(Axis(position + moved, velocity + (a + change / 2) * dt, a + change))
+    return after

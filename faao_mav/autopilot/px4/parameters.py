@@ -65,6 +65,12 @@ class Px4Limits(Model):
     descent_acceleration: float = _own("m/s^2", 3.0, "MPC_ACC_DOWN_MAX")
     body: CopterBody = PX4_BODY
 
+    def vertical(self, rise: float) -> tuple[float, float]:
+        """Return the greatest speed, m/s, and acceleration, m/s², of a climb by `rise`, m."""
+        if rise > 0:
+            return self.climb_speed, self.climb_acceleration
+        return self.descent_speed, self.descent_acceleration
+
 
 COPTER_TABLE = table(
     *Px4Limits.parameters(),
