@@ -1,11 +1,11 @@
 """How a mock autopilot flies: what its mode, its mission, its fence and setpoints have it do.
 
 Measured in simulation. At the fence, at 8 m/s: ArduCopter 4.7 (FENCE_ENABLE 1, FENCE_ACTION 1)
-changed to RTL 1 m outside, got 15 m outside, went home and landed; PX4 1.16.1 (GF_ACTION 2) changed
-to hold 4 m outside and stayed 2 m outside. By setpoints: ArduCopter takes off in GUIDED by a
-command, and stops when they cease; PX4 enters Offboard after a second of them, takes off by them,
-and changes its mode when they cease, by default to Position, where it sinks without sticks. Both
-take up a mission in flight, without its take-off.
+changed to RTL 1 m outside, went home and landed; PX4 1.16.1 (GF_ACTION 2) changed to hold 4 m
+outside. By setpoints: ArduCopter takes off in GUIDED by a command, and stops when they cease; PX4
+enters Offboard after a second of them, takes off by them, and changes its mode when they cease, by
+default to Position, where it sinks without sticks. Both take up a mission in flight, without its
+take-off.
 """
 
 import math
@@ -53,7 +53,9 @@ class Flight:
         fly: Fly | None,
         wind: tuple[float, float],
     ) -> None:
-        self._type, self._values, self._home = vehicle_type, values, home
+        self._type, self._values = vehicle_type, values
+        self._frame = LocalFrame(home.latitude, home.longitude)
+        self._own_frame = vehicle_type.family.local_frame(home.latitude, home.longitude)
         self._fly = fly or partial(predict, wind=wind)
         self.modes, self.rules = vehicle_type.modes, vehicle_type.family.setpoints
         self.mode = self.asked_mode = self.modes.rest
@@ -68,6 +70,7 @@ class Flight:
     def stop(self) -> None:
         """Stand at home with the motors off, and know of no setpoints."""
         self._first_heard = self._last_heard = -math.inf
+        self._begun = self._since = 0.0
         self.aircraft.stand()
         self.land()
 
@@ -87,7 +90,6 @@ class Flight:
         if mode == self.modes.guided:
             self._track = None
         if mode != self.modes.mission and self.armed:
-            self._break_off(now)
             self._do(self._action_of(mode), now)
 
     def _action_of(self, mode: int) -> FenceAction:
@@ -95,12 +97,17 @@ class Flight:
         return next((act for act, own in self.modes.at_fence.items() if own == mode), "hold")
 
     def _do(self, action: FenceAction | Literal["sink"], now: float) -> None:
-        """Return, land, sink or hold, from where it is; a flight that is terminated lands too."""
-        self._follows = False
+        """Return, land, sink or hold, from where it is; a flight that is terminated lands too.
+
+        A mission that is broken off is taken up from here.
+        """
+        if self.on_mission:
+            self._since = now - self._begun
+        self._follows = self.on_mission = False
         vehicle, (east, north, up) = self.vehicle, self.aircraft.at(now).position
         vertical, legs = vehicle.vertical, list[tuple[Real, float]]()
         if not self.aircraft.flies(now) or action == "hold":
-            self.aircraft.hold(now, vehicle.top_airspeed)
+            self.aircraft.go(now)
             return
         if action == "return":
             high = vertical.returns_at(up)
@@ -155,27 +162,22 @@ class Flight:
         self._pending = self._pending[len(due) :]
         return due
 
-    def at_fence(self, now: float) -> FenceAction | None:
-        """Break off a mission that leaves the fence; return what is done, once."""
+    def leaves_fence(self, now: float) -> bool:
+        """Do what is to be done where a mission leaves the fence; tell that, once."""
         if not self.on_mission or self._begun + self._leaves > now + EARLY:
-            return None
+            return False
         self._leaves = math.inf
         action = self._type.at_fence(self.vehicle).action
         if action != "report":
-            self._break_off(now)
             self.mode = self.asked_mode = self.modes.at_fence.get(action, self.mode)
             self._do(action, now)
-        return action
+        return True
 
     def home_outside(self, fence: Fence) -> bool:
         """Tell whether home lies outside a `fence` that it does something about."""
-        vehicle, frame = self.vehicle, LocalFrame(self._home.latitude, self._home.longitude)
+        vehicle = self.vehicle
         acts = fence and self._type.at_fence(vehicle).action != "nothing"
-        return bool(acts) and not _covered(fence, frame, vehicle, np.zeros((1, 2))).all()
-
-    def _break_off(self, now: float) -> None:
-        if self.on_mission:
-            self._since, self.on_mission = now - self._begun, False
+        return bool(acts) and not _covered(fence, self._frame, vehicle, np.zeros((1, 2))).all()
 
     # ---- setpoints
 
@@ -194,17 +196,19 @@ class Flight:
         if comes_back:
             self.mode = self.asked_mode
         flies = self.rules.takes_off_by_setpoints or self.aircraft.flies(now)
-        if guided and flies and (np.abs(_rows(message)) < _FARTHEST).all():
-            self._follows, airspeed = True, self.vehicle.top_airspeed
-            carries_on = self.rules.carries_on
-            self.aircraft.pursue(now, self.aim(message), airspeed, carries_on=carries_on)
+        aim = self.aim(message)
+        if guided and flies and (np.abs(aim) < _FARTHEST).all():
+            self._follows, carries_on = True, self.rules.carries_on
+            self.aircraft.pursue(now, aim, self.vehicle.top_airspeed, carries_on=carries_on)
         return comes_back
 
     def aim(self, message: SetPositionTargetLocalNed) -> Real:
         """Return what `message` says, (3, 3), in metres east, north and up of home."""
-        origin, aim = (self._home.latitude, self._home.longitude), _rows(message)
-        frame = self._type.family.local_frame(*origin)
-        aim[0, :2] = LocalFrame(*origin).to_local(*frame.to_geodetic(aim[0, :2]))
+        m = message
+        rows = [m.y, m.x, -m.z], [m.vy, m.vx, -m.vz], [m.afy, m.afx, -m.afz]
+        aim = np.array(rows, dtype=float)
+        if (np.abs(aim) < _FARTHEST).all():
+            aim[0, :2] = self._frame.to_local(*self._own_frame.to_geodetic(aim[0, :2]))
         return aim
 
     def lose_setpoints(self, now: float) -> None:
@@ -231,13 +235,6 @@ class Flight:
         """Tell whether there was no setpoint for as long as its parameter allows."""
         allowed = max(self._values.get(self.rules.timeout, 0.0), self.rules.least_timeout)
         return now - self._last_heard > allowed
-
-
-def _rows(message: SetPositionTargetLocalNed) -> Real:
-    """Return position, velocity and acceleration of `message`, each east, north, up."""
-    m = message
-    rows = [m.y, m.x, -m.z], [m.vy, m.vx, -m.vz], [m.afy, m.afx, -m.afz]
-    return np.array(rows, dtype=float)
 
 
 def _reached(track: Track, mission: Mission) -> list[tuple[float, int]]:

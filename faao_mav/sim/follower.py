@@ -7,9 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
-from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.item import Home
-from faao_mav.wire.messages import Attitude, GlobalPositionInt, LocalPositionNed, Message
 
 _STEP, _LONGEST = 0.05, 60.0
 """Seconds between two steps towards a setpoint, and the longest that is flown at once: after a
@@ -23,7 +20,6 @@ _PUSH = 5.0
 
 _GROUND = 0.5
 """Metres above home below which it stands on the ground; chosen."""
-
 
 EARLY = 1e-6
 """Seconds by which an event may come early, rather than a tick late; chosen."""
@@ -51,36 +47,31 @@ class Follower:
     def stand(self) -> None:
         """Stand at home, whatever it did."""
         self._time, self._p, self._v, self._item = 0.0, np.zeros(3), np.zeros(3), 0
-        self._t, self._places, self._items = np.zeros(1), np.zeros((1, 3)), np.zeros(1, dtype=int)
-        self._aim: Real | None = None
+        self.play(np.zeros(1), np.zeros((1, 3)), np.zeros(1, dtype=int))
 
     def play(self, t: Real, places: Real, items: NDArray[np.int_]) -> None:
         """Be at `places` (k, 3), m, at the times `t` (k,), s, on the way to `items` (k,)."""
-        self._t, self._places, self._items, self._aim = t, places, items, None
+        self._t, self._places, self._items = t, places, items
+        self._aim: Real | None = None
 
     def go(self, now: float, *legs: tuple[Real, float]) -> None:
-        """Fly from where it is straight to one place after another, each at a speed, m/s."""
-        points, times = [self.at(now).position], [now]
+        """Fly from where it is straight to one place after another, each at a speed, m/s.
+
+        Without `legs` it stays where it is, and never arrives.
+        """
+        points, times = [self.at(now).position], [now if legs else math.inf]
         for place, speed in legs:
             points.append(place)
             times.append(times[-1] + float(np.linalg.norm(points[-1] - points[-2])) / speed)
         self.play(np.array(times), np.array(points), np.full(len(points), self._item))
 
-    def pursue(self, now: float, aim: Real, airspeed: float, *, carries_on: bool = False) -> None:
+    def pursue(self, now: float, aim: Real, airspeed: float, *, carries_on: bool) -> None:
         """Fly to `aim` at up to `airspeed`, m/s, or to where it is by then if it `carries_on`.
 
         It is (3, 3): position, m, velocity, m/s, and acceleration, m/s².
         """
         self.at(now)
         self._aim, self._since, self._airspeed, self._carries_on = aim, now, airspeed, carries_on
-
-    def hold(self, now: float, airspeed: float) -> None:
-        """Stop, and come back to where it is now; on the ground stand until it is sent away."""
-        here, rest = self.at(now).position, np.zeros(3)
-        if here[2] < _GROUND:
-            self.play(np.array([math.inf]), np.array([here]), np.array([self._item]))
-        else:
-            self.pursue(now, np.array([here, rest, rest]), airspeed)
 
     @property
     def arrives(self) -> float:
@@ -106,14 +97,12 @@ class Follower:
         return Posture(self._p, self._v, self._item)
 
     def _play_until(self, now: float) -> None:
-        k = min(int(np.searchsorted(self._t, now, side="right")), len(self._t)) - 1
-        self._time, self._item, self._v = now, int(self._items[max(k, 0)]), np.zeros(3)
-        if k < 0 or k == len(self._t) - 1:
-            self._p = self._places[max(k, 0)]
-            return
-        (start, end), lasting = self._places[k : k + 2], self._t[k + 1] - self._t[k]
-        self._v = (end - start) / lasting
-        self._p = start + self._v * (now - self._t[k])
+        k = max(int(np.searchsorted(self._t, now, side="right")) - 1, 0)
+        self._time, self._item = now, int(self._items[k])
+        self._p, self._v = self._places[k], np.zeros(3)
+        if self._t[k] <= now and k + 1 < len(self._t):
+            self._v = (self._places[k + 1] - self._p) / (self._t[k + 1] - self._t[k])
+            self._p = self._p + self._v * (now - self._t[k])
 
     def _step_to(self, aim: Real, step: float) -> None:
         self._time += step
@@ -128,37 +117,3 @@ class Follower:
         before, self._v = self._v, through_air + self._wind
         self._p = self._p + (before + self._v) / 2 * step
         self._p[2] = max(self._p[2], 0.0)
-
-
-def global_position(posture: Posture, home: Home, since_boot: float) -> GlobalPositionInt:
-    """Return where `posture` is on Earth, `since_boot` seconds after start-up."""
-    (east, north, up), (v_east, v_north, v_up) = map(list, (posture.position, posture.velocity))
-    frame = LocalFrame(home.latitude, home.longitude)
-    latitude, longitude = map(float, frame.to_geodetic([east, north]))
-    return GlobalPositionInt(
-        int(since_boot * 1000) % 2**32,
-        round(latitude * 1e7),
-        round(longitude * 1e7),
-        _fitted((home.altitude + up) * 1000, 32),
-        _fitted(up * 1000, 32),
-        _fitted(100 * v_north, 16),
-        _fitted(100 * v_east, 16),
-        _fitted(-100 * v_up, 16),
-        round(math.degrees(math.atan2(v_east, v_north)) % 360 * 100) % 36_000,
-    )
-
-
-def local_reports(posture: Posture, since_boot: float) -> list[Message]:
-    """Return where `posture` is from home, and where it heads."""
-    time = int(since_boot * 1000) % 2**32
-    (east, north, up), (v_east, v_north, v_up) = map(list, (posture.position, posture.velocity))
-    return [
-        LocalPositionNed(time, north, east, -up, v_north, v_east, -v_up),
-        Attitude(time, 0.0, 0.0, math.atan2(v_east, v_north), 0.0, 0.0, 0.0),
-    ]
-
-
-def _fitted(value: float, bits: int) -> int:
-    """Return what a field of so many bits holds: 300 m/s and more are cut."""
-    most = (1 << bits - 1) - 1
-    return round(min(max(value, -most), most))

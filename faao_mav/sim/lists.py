@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from faao_mav.autopilot import VehicleType
-from faao_mav.autopilot.dialect import BESIDE
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Frame
 from faao_mav.mission.item import Home, MissionItem
@@ -18,38 +17,6 @@ from faao_mav.wire.wire_items import home_items, mission_item, mission_of, wire_
 
 _FIELDS = range(MavResult.INVALID_PARAM1, MavResult.INVALID_PARAM7 + 1)
 """What is wrong if param1 to param4, x, y or z is."""
-
-
-class StoredLists:
-    """What is stored: items as the vehicle gives them back."""
-
-    def __init__(self, vehicle: VehicleType, home: Home) -> None:
-        self.vehicle, self._home = vehicle, home
-        self._items: dict[MissionType, tuple[WireItem, ...]] = dict.fromkeys(MissionType, ())
-
-    def items(self, part: MissionType) -> tuple[WireItem, ...]:
-        """Return what a download gives."""
-        return self._items[part]
-
-    def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
-        """Store all of `items`, which are as `kept` gives them, in place of the list."""
-        self._items[part] = tuple(items)
-
-    def kept(self, part: MissionType, seq: int, item: WireItem) -> WireItem:
-        """Return what becomes of `item`; a home item is the vehicle's own, whatever is sent."""
-        if seq < home_items(self.vehicle, part):
-            h = self._home
-            return wire_item(MissionItem(16, 0, x=h.latitude, y=h.longitude, z=h.altitude), seq)
-        stored = self.vehicle.dialect.stored(mission_item(item))
-        return wire_item(stored, seq, current=seq == 0 and not self.vehicle.dialect.home_row)
-
-    def number(self, part: MissionType) -> int:
-        """Return a number that tells this list from others: a checksum; 0 when empty."""
-        packed = b"".join(
-            struct.pack("<HB5f2i", item.command, item.frame, *item.params, item.z, item.x, item.y)
-            for item in self._items[part]
-        )
-        return zlib.crc32(packed)
 
 
 @dataclass(slots=True)
@@ -65,13 +32,9 @@ class _Transfer:
     asked: float = 0.0
     items: tuple[WireItem, ...] = ()
 
-    def of(self, partner: Address, part: MissionType) -> bool:
-        """Tell whether it is that list with that partner."""
-        return (partner, part) == (self.partner, self.part)
 
-
-class ListServer:
-    """Answers the messages of the mission protocol as the autopilot of `behaviour` does.
+class Lists:
+    """What `vehicle` stores, and how it answers the mission protocol as `behaviour` says.
 
     `ready` tells whether booting is over, `flying` whether the mission is being flown. By its
     manners it answers each request for an item by itself, and each list has an upload of its own;
@@ -81,14 +44,16 @@ class ListServer:
 
     def __init__(
         self,
-        stored: StoredLists,
+        vehicle: VehicleType,
+        home: Home,
         behaviour: Behaviour,
         ready: Callable[[], bool],
         flying: Callable[[], bool],
     ) -> None:
-        self._stored, self._behaviour = stored, behaviour
-        self._manners, self._dialect = stored.vehicle.family.manners, stored.vehicle.dialect
+        self._vehicle, self._home, self._behaviour = vehicle, home, behaviour
+        self._manners, self._dialect = vehicle.family.manners, vehicle.dialect
         self._ready, self._flying = ready, flying
+        self._items: dict[MissionType, tuple[WireItem, ...]] = dict.fromkeys(MissionType, ())
         self._alone = not self._manners.any_request_order
         self._legacy, self._now = behaviour.legacy_first, 0.0
         self._busy = MavResult.ERROR if self._alone else MavResult.DENIED
@@ -97,7 +62,32 @@ class ListServer:
     def reset(self) -> None:
         """Forget what is under way, as a reboot does."""
         self._transfers: dict[MissionType, _Transfer] = {}
-        self._last: _Transfer | None = None
+        self._whole: tuple[Address, MissionType, int] | None = None
+        """The transfer that has ended with all items: with whom, of what, and how many."""
+
+    def items(self, part: MissionType) -> tuple[WireItem, ...]:
+        """Return what a download gives."""
+        return self._items[part]
+
+    def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
+        """Store all of `items`, which are as `kept` gives them, in place of the list."""
+        self._items[part] = tuple(items)
+
+    def kept(self, part: MissionType, seq: int, item: WireItem) -> WireItem:
+        """Return what becomes of `item`; a home item is the vehicle's own, whatever is sent."""
+        if seq < home_items(self._vehicle, part):
+            h = self._home
+            return wire_item(MissionItem(16, 0, x=h.latitude, y=h.longitude, z=h.altitude), seq)
+        stored = self._dialect.stored(mission_item(item))
+        return wire_item(stored, seq, current=seq == 0 and not self._dialect.home_row)
+
+    def number(self, part: MissionType) -> int:
+        """Return a number that tells this list from others, a checksum; 0: it has no numbers."""
+        packed = b"".join(
+            struct.pack("<HB5f2i", item.command, item.frame, *item.params, item.z, item.x, item.y)
+            for item in self._items[part]
+        )
+        return zlib.crc32(packed) if self._behaviour.numbers_lists else 0
 
     @property
     def deadline(self) -> float | None:
@@ -113,24 +103,21 @@ class ListServer:
         self._now, out = now, list[Message]()
         for transfer in list(self._transfers.values()):
             if now >= transfer.heard + self._manners.patience:
-                out.append(_warning(self._behaviour.timeout_text))
+                out.append(_warning("Mission transfer timeout"))
                 cancelled = self._end(transfer, MavResult.OPERATION_CANCELLED)
                 out += cancelled[self._alone :]
             elif now >= self._due(transfer):
                 out += self._ask(transfer)
         return out
 
-    def on(self, envelope: messages.Envelope, now: float) -> list[Message]:
+    def on(self, sender: Address, message: ListMessage, now: float) -> list[Message]:
         """Answer a message of the mission protocol."""
-        sender, message, self._now = envelope.sender, envelope.message, now
-        if not isinstance(message, ListMessage):
-            return []
-        given = message.mission_type
+        self._now, given = now, message.mission_type
         everything = given == ALL_TYPES and isinstance(message, messages.MissionClearAll)
         parts = [part for part in MissionType if everything or given == part]
         if not parts:
-            known = isinstance(message, messages.MissionAck)
-            return [] if known else _ack(sender, given, self._behaviour.unknown_list)
+            is_ack = isinstance(message, messages.MissionAck)
+            return [] if is_ack else _ack(sender, given, MavResult.UNSUPPORTED)
         part, only = parts[0], next(iter(self._transfers.values()), None)
         under_way = only if self._alone else self._transfers.get(part)
         match message:
@@ -163,18 +150,16 @@ class ListServer:
             if self._alone or not again:
                 return _ack(sender, under_way.part, self._busy)
         limit = (self._behaviour.mission_limit, self._dialect.fence_rows, self._dialect.rally_rows)
-        fits = self._ready() and count <= limit[part]
-        result = MavResult.ACCEPTED if fits else MavResult.NO_SPACE
-        result = self._behaviour.refusals.get((part, COUNT), result)
-        if result != MavResult.ACCEPTED:
-            text = messages.Statustext(
-                MavSeverity.WARNING, f"Only {limit[part]} items are supported"
-            )
-            return [*_ack(sender, part, result), *([text] if count > limit[part] else [])]
+        refusal = self._behaviour.refusals.get((part, COUNT))
+        if count > limit[part]:
+            text = _warning(f"Only {limit[part]} items are supported")
+            return [*_ack(sender, part, refusal or MavResult.NO_SPACE), text]
+        if refusal or not self._ready():
+            return _ack(sender, part, refusal or MavResult.NO_SPACE)
         if count == 0:
             return self._clear(sender, part, [part])
         if self._in_place(part):
-            self._stored.replace(part, self._stored.items(part)[:count])
+            self.replace(part, self.items(part)[:count])
         self._transfers[part] = _Transfer(sender, part, count, self._now)
         return self._ask(self._transfers[part])
 
@@ -183,8 +168,9 @@ class ListServer:
     ) -> list[Message]:
         part, seq = MissionType(message.mission_type), message.seq
         if upload is None:
-            again = self._takes_again(sender, part, seq)
-            return _ack(sender, part, MavResult.ACCEPTED if again else MavResult.ERROR)
+            # PX4 acknowledges the last item of the upload before once more.
+            before = self._alone and self._whole == (sender, part, seq + 1)
+            return _ack(sender, part, MavResult.ACCEPTED if before else MavResult.ERROR)
         if sender != upload.partner:
             return [] if self._alone else _ack(sender, part, self._busy)
         if part != upload.part or upload.sending:
@@ -197,50 +183,46 @@ class ListServer:
         result = self._check_item(part, seq, message.item)
         if result != MavResult.ACCEPTED:
             return self._end(upload, result)
-        upload.items = (*upload.items, self._stored.kept(part, seq, message.item))
+        upload.items = (*upload.items, self.kept(part, seq, message.item))
         upload.heard, upload.passed = self._now, seq + 1
         if self._in_place(part):
-            self._stored.replace(part, upload.items + self._stored.items(part)[seq + 1 :])
+            self.replace(part, upload.items + self.items(part)[seq + 1 :])
         if upload.passed < upload.count:
             return self._ask(upload)
         if part is MissionType.FENCE and not (self._alone or self._is_fence(upload.items)):
             text = _warning("Fence validation failed")
             return [text, *self._end(upload, MavResult.ERROR)]
-        self._stored.replace(part, upload.items)
+        self.replace(part, upload.items)
         return self._end(upload, MavResult.ACCEPTED)
-
-    def _takes_again(self, sender: Address, part: MissionType, seq: int) -> bool:
-        """Tell whether an item is the last of the transfer before, and is acknowledged again."""
-        last = self._last
-        if last is None or not self._alone:
-            return False
-        whole = last.passed == last.count or not self._behaviour.complete_only
-        return whole and (sender, part, seq + 1) == (last.partner, last.part, last.passed)
 
     def _on_list(
         self, sender: Address, part: MissionType, under_way: _Transfer | None
     ) -> list[Message]:
-        items = self._stored.items(part)
+        items = self.items(part)
         if self._alone:
-            sent = under_way is None or (
+            if under_way is not None and not (
                 under_way.sending
-                and (under_way.passed == under_way.count or under_way.of(sender, part))
-            )
-            if not sent:
+                and (
+                    under_way.passed == under_way.count
+                    or (sender, part) == (under_way.partner, under_way.part)
+                )
+            ):
                 return []
             sending = _Transfer(sender, part, len(items), self._now, sending=True, items=items)
             self._transfers = {part: sending}
         elif under_way is not None:
             return _ack(sender, part, self._busy)
-        return [messages.MissionCount(sender, part, len(items), self._number(part))]
+        return [messages.MissionCount(sender, part, len(items), self.number(part))]
 
     def _on_request(
         self, sender: Address, request: messages.MissionRequestInt, under_way: _Transfer | None
     ) -> list[Message]:
         part, seq = MissionType(request.mission_type), request.seq
-        items = self._stored.items(part)
+        items = self.items(part)
         if self._alone:
-            if under_way is None or not (under_way.sending and under_way.of(sender, part)):
+            if under_way is None or not under_way.sending:
+                return []
+            if (sender, part) != (under_way.partner, under_way.part):
                 return []
             if seq not in (under_way.passed, under_way.passed - 1) or seq == under_way.count:
                 return self._end(under_way, MavResult.ERROR)
@@ -263,7 +245,7 @@ class ListServer:
     def _clear(self, sender: Address, given: int, parts: Iterable[MissionType]) -> list[Message]:
         for part in parts:
             self._transfers.pop(part, None)
-            self._stored.replace(part, ())
+            self.replace(part, ())
         return _ack(sender, given, MavResult.ACCEPTED)
 
     def _ask(self, upload: _Transfer) -> list[Message]:
@@ -273,19 +255,17 @@ class ListServer:
 
     def _end(self, transfer: _Transfer, result: MavResult) -> list[Message]:
         del self._transfers[transfer.part]
-        self._last = transfer
-        number = self._number(transfer.part) if result == MavResult.ACCEPTED else 0
+        whole = transfer.passed == transfer.count
+        self._whole = (transfer.partner, transfer.part, transfer.count) if whole else None
+        number = self.number(transfer.part) if result == MavResult.ACCEPTED else 0
         return [messages.MissionAck(transfer.partner, transfer.part, result, number)]
-
-    def _number(self, part: MissionType) -> int:
-        return self._stored.number(part) if self._behaviour.numbers_lists else 0
 
     def _in_place(self, part: MissionType) -> bool:
         return not self._dialect.atomic and part is not MissionType.FENCE
 
     def _is_fence(self, items: tuple[WireItem, ...]) -> bool:
         try:
-            mission_of({MissionType.FENCE: items}, self._stored.vehicle)
+            mission_of({MissionType.FENCE: items}, self._vehicle)
         except InputError:
             return False
         return True
@@ -294,33 +274,29 @@ class ListServer:
         """Return what it answers to `item`, number `seq` of that list."""
         if (refusal := self._behaviour.refusals.get((part, seq))) is not None:
             return refusal
-        if part is MissionType.MISSION:
-            if item.command in BESIDE:
-                return self._behaviour.misplaced
-            if item.command in (0, 1):
-                return self._behaviour.nonsense
-            return _check_mission_item(mission_item(item), self._stored.vehicle)
-        if (result := self._behaviour.beside(part, item)) != MavResult.ACCEPTED:
+        result = self._behaviour.answer(part, item)
+        if result != MavResult.ACCEPTED:
             return result
+        if part is MissionType.MISSION:
+            return self._check_mission_item(mission_item(item))
         if abs(item.x) > 900_000_000:
             return MavResult.INVALID_PARAM5_X
         return MavResult.INVALID_PARAM6_Y if abs(item.y) > 1_800_000_000 else MavResult.ACCEPTED
 
+    def _check_mission_item(self, item: MissionItem) -> MavResult:
+        """Return what is wrong with `item`: the first field that the vehicle does not take.
 
-def _check_mission_item(item: MissionItem, vehicle: VehicleType) -> MavResult:
-    """Return what is wrong with `item`: the first field that `vehicle` does not take.
-
-    Fields are tried in the order of the message, those behind the one tried set to 0.
-    """
-    refusal = vehicle.dialect.refusal
-    if item.frame != Frame.MISSION and refusal(MissionItem(16, item.frame)) is not None:
-        return MavResult.UNSUPPORTED_FRAME
-    values = (*item.params, item.x, item.y, item.z)
-    for tried in range(len(values) + 1):
-        one, two, three, four, x, y, z = (*values[:tried], *[0.0] * (len(values) - tried))
-        if refusal(replace(item, params=(one, two, three, four), x=x, y=y, z=z)) is not None:
-            return MavResult.UNSUPPORTED if tried == 0 else MavResult(_FIELDS[tried - 1])
-    return MavResult.ACCEPTED
+        Fields are tried in the order of the message, those behind the one tried set to 0.
+        """
+        refusal = self._dialect.refusal
+        if item.frame != Frame.MISSION and refusal(MissionItem(16, item.frame)) is not None:
+            return MavResult.UNSUPPORTED_FRAME
+        values = (*item.params, item.x, item.y, item.z)
+        for tried in range(len(values) + 1):
+            one, two, three, four, x, y, z = (*values[:tried], *[0.0] * (len(values) - tried))
+            if refusal(replace(item, params=(one, two, three, four), x=x, y=y, z=z)) is not None:
+                return MavResult.UNSUPPORTED if tried == 0 else MavResult(_FIELDS[tried - 1])
+        return MavResult.ACCEPTED
 
 
 def _warning(text: str) -> Message:

@@ -6,24 +6,25 @@ from dataclasses import replace
 
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.behaviour import Behaviour, whole
 from faao_mav.sim.flight import Flight, Fly
-from faao_mav.sim.follower import Posture, global_position, local_reports
-from faao_mav.sim.lists import ListServer, StoredLists
+from faao_mav.sim.follower import Posture
+from faao_mav.sim.lists import Lists
 from faao_mav.sim.parameter_protocol import ParameterServer
 from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext
-from faao_mav.wire.protocol import Address, MavCommand, MissionType
+from faao_mav.wire.protocol import Address, MavCommand, MavSeverity, MavState, MissionType
 from faao_mav.wire.wire_items import home_items, mission_of
 
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
 
-_SET_MODE, _AUTOPILOT_VERSION = 11, 148
-"""The numbers of these messages."""
+_SET_MODE = 11
+"""The number of SET_MODE."""
 
 _CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
 """MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
@@ -71,23 +72,22 @@ class MockAutopilot(Machine[None]):
         battery: int = 100,
     ) -> None:
         super().__init__()
-        self._battery = battery
         self.behaviour, self.address, self.home = behaviour, address, home
         self.vehicle = vehicle_type(behaviour.family.key, aircraft)
-        self.lists = StoredLists(self.vehicle, home)
-        self._tells_asked_mode = False
         known = self.vehicle.defaults() | dict(behaviour.family.setpoints.defaults)
         for failsafe in self.vehicle.failsafes:
             known |= dict(failsafe.defaults)
         known |= behaviour.parameters
         self.parameters = ParameterServer(known, parameters or {}, self.vehicle)
         self.flight = Flight(self.vehicle, self.parameters.values, home, fly, wind)
-        self._server = ListServer(self.lists, behaviour, self._is_ready, self._is_flying)
+        self.lists = Lists(
+            self.vehicle, home, behaviour, self._is_ready, lambda: self.flight.on_mission
+        )
         self._speedup, self._beat, self._boot, self._place = speedup, beat, boot, place
+        self._battery, self._tells_asked_mode, self._current = battery, False, 0
         self._period = 1 / rate / speedup if rate > 0 else math.inf
         self._booted = self._now = self._ticked = self._next_beat = self._next_report = 0.0
         self._ready_at = boot
-        self._current = 0
 
     @property
     def armed(self) -> bool:
@@ -103,13 +103,10 @@ class MockAutopilot(Machine[None]):
     def deadline(self) -> float | None:
         """When `tick` is due."""
         event = self._booted + self.flight.next_event / self._speedup
-        ahead = self.armed and event > self._ticked  # what a tick has seen is over
-        due = [self._next_beat, event if ahead else math.inf]
-        if self._period < math.inf:
-            due.append(self._next_report)
-        if self._server.deadline is not None:
-            due.append(self._server.deadline)
-        return min(due)
+        due = [self._next_beat, self.lists.deadline or math.inf]
+        if self.armed and event > self._ticked:  # what a tick has seen is over
+            due.append(event)
+        return min(*due, self._next_report if self._period < math.inf else math.inf)
 
     def start(self, now: float) -> Sequence[Message]:
         """Boot."""
@@ -119,7 +116,7 @@ class MockAutopilot(Machine[None]):
 
     def reboot(self, now: float) -> None:
         """Begin anew; what is stored stays, what is under way is lost."""
-        self._server.reset()
+        self.lists.reset()
         self.flight.stop()
         self._current = 0
         self._booted, self._ready_at = now, now + self._boot
@@ -136,17 +133,29 @@ class MockAutopilot(Machine[None]):
         """Return the time on its own clock, s since it booted."""
         return (now - self._booted) * self._speedup
 
+    def _is_ready(self) -> bool:
+        return self._now >= self._ready_at
+
+    def _knows_place(self) -> bool:
+        return self._now >= self._ready_at + self._place
+
+    # ---- what it says by itself
+
     def _time_out(self, now: float) -> Sequence[Message]:
         late = now - (self.deadline or now)
         if self._speedup > 1 and self.flight.on_mission and late > _LATE:
             self._booted += late
         self._now = self._ticked = now
-        out: list[Message] = list(self._server.tick(now))
+        out = self.lists.tick(now)
         if self.armed:
             out += self._follow(now)
         if now >= self._next_beat:
             self._next_beat = now + self._beat
-            out += [self._heartbeat(), self._mission_current(now), *self._system_status()]
+            out += [self._heartbeat(), self._mission_current(now)]
+            # It tells that its checks pass, once it is ready, and how its battery is.
+            passes = protocol.PREARM_CHECK * self._is_ready()
+            out.append(messages.SysStatus(passes, 12_600, self._battery))
+            out.append(messages.BatteryStatus(0, 1, self._battery))
             if self._tells_asked_mode:
                 out.append(messages.CurrentMode(self.flight.mode, self.flight.asked_mode))
         if now >= self._next_report and self._period < math.inf:
@@ -156,24 +165,84 @@ class MockAutopilot(Machine[None]):
 
     def _place_reports(self, now: float) -> list[Message]:
         """Return where it is, on Earth first; what it tells of that while it does not know."""
-        posture, clock = self.posture(now), self._clock(now)
-        place = global_position(posture, self.home, clock)
-        if self._knows_place():
-            return [place, *local_reports(posture, clock)]
-        return [replace(place, lat=0, lon=0, alt=0)] if self.behaviour.tells_no_place else []
+        time, posture = int(self._clock(now) * 1000) % 2**32, self.posture(now)
+        (east, north, up), (v_east, v_north, v_up) = map(list, (posture.position, posture.velocity))
+        frame = LocalFrame(self.home.latitude, self.home.longitude)
+        latitude, longitude = map(float, frame.to_geodetic([east, north]))
+        heading = math.atan2(v_east, v_north)
+        place = messages.GlobalPositionInt(
+            time,
+            round(latitude * 1e7),
+            round(longitude * 1e7),
+            _fitted((self.home.altitude + up) * 1000, 32),
+            _fitted(up * 1000, 32),
+            _fitted(100 * v_north, 16),
+            _fitted(100 * v_east, 16),
+            _fitted(-100 * v_up, 16),
+            round(math.degrees(heading) % 360 * 100) % 36_000,
+        )
+        if not self._knows_place():
+            return [replace(place, lat=0, lon=0, alt=0)] if self.behaviour.tells_no_place else []
+        local = messages.LocalPositionNed(time, north, east, -up, v_north, v_east, -v_up)
+        return [place, local, messages.Attitude(time, 0.0, 0.0, heading, 0.0, 0.0, 0.0)]
+
+    def _follow(self, now: float) -> list[Message]:
+        """Let the flight go on, and tell what becomes of it."""
+        flight, clock = self.flight, self._clock(now)
+        first = home_items(self.vehicle, MissionType.MISSION)
+        out: list[Message] = [messages.MissionItemReached(n + first) for n in flight.reached(clock)]
+        before = flight.mode
+        if flight.leaves_fence(clock):
+            out.append(Statustext(MavSeverity.CRITICAL, "Polygon fence breached"))
+        flight.lose_setpoints(clock)
+        current = flight.aircraft.at(clock).item + first
+        if flight.on_mission and current != self._current:
+            self._current = current
+            rows = self.lists.items(MissionType.MISSION)[current : current + 1]
+            returns = [row for row in rows if row.command == Command.NAV_RETURN_TO_LAUNCH]
+            if returns and self.vehicle.kind in self.behaviour.returns_by_mode:
+                flight.mode = flight.modes.at_fence.get("return", flight.mode)
+            out.append(self._mission_current(now))
+        if flight.aircraft.landed(clock):
+            flight.land()
+            out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
+        if (flight.mode, flight.armed) != (before, True):
+            out.append(self._heartbeat())
+        return out
+
+    def _mission_current(self, now: float) -> Message:
+        rows = len(self.lists.items(MissionType.MISSION))
+        total = max(rows - home_items(self.vehicle, MissionType.MISSION), 0)
+        # MISSION_STATE: none, not started, active
+        state = 1 if total == 0 else 3 if self.flight.on_mission else 2
+        if self.flight.on_mission and self._clock(now) >= self.flight.aircraft.arrives:
+            state = protocol.MISSION_COMPLETE
+        number = self.lists.number(MissionType.MISSION)
+        return messages.MissionCurrent(self._current, total, state, number)
+
+    def _heartbeat(self) -> Message:
+        state = MavState.ACTIVE if self.armed else MavState.STANDBY
+        state = state if self._is_ready() else MavState.CALIBRATING
+        on_mission = self.mode == self.flight.modes.mission
+        flags = _CUSTOM_MODE | _AUTO * on_mission | protocol.ARMED * self.armed
+        autopilot = self.vehicle.family.mav_autopilot
+        return messages.Heartbeat(self.vehicle.mav_types[0], autopilot, flags, self.mode, state)
+
+    # ---- what it answers
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
         sender, message = envelope.sender, envelope.message
-        if isinstance(message, messages.Timesync):
-            here = int(self._clock(now) * 1e9) + 1
-            return [messages.Timesync(here, message.ts1)] if message.tc1 == 0 else ()
-        if isinstance(message, messages.SetMode):
-            target = Address(message.target_system, 0)
-        elif isinstance(message, messages.Addressed):
-            target = message.target
-        else:
-            return ()
+        match message:
+            case messages.Timesync(tc1=asked, ts1=theirs):
+                here = int(self._clock(now) * 1e9) + 1
+                return [messages.Timesync(here, theirs)] if asked == 0 else ()
+            case messages.SetMode(target_system=system):
+                target = Address(system, 0)
+            case messages.Addressed():
+                target = message.target
+            case _:
+                return ()
         own = self.address
         # PX4 takes for its own what is sent to its mission planner.
         as_planner = Address(own.system, protocol.GROUND_STATION.component)
@@ -186,34 +255,22 @@ class MockAutopilot(Machine[None]):
                 return [messages.CommandAck(sender, _SET_MODE, self._set_mode(mode, now))]
             case messages.ParamRequestList() | messages.ParamRequestRead() | messages.ParamSet():
                 return self.parameters.on(message)
-            case messages.MissionSetCurrent(seq=seq):
-                return self._set_current(seq, now)
             case messages.SetPositionTargetLocalNed():
                 comes_back = self.flight.hear(message, self._clock(now))
                 modes = messages.CurrentMode(self.flight.mode, self.flight.asked_mode)
                 return [self._heartbeat(), modes] if comes_back else ()
-        if self.behaviour.silent_at_boot and not self._is_ready():
-            return ()
-        return self._server.on(envelope, now)
-
-    def _is_ready(self) -> bool:
-        return self._now >= self._ready_at
-
-    def _knows_place(self) -> bool:
-        return self._now >= self._ready_at + self._place
-
-    def _is_flying(self) -> bool:
-        return self.flight.on_mission
+            case messages.ListMessage() if self._is_ready() or not self.behaviour.silent_at_boot:
+                return self.lists.on(sender, message, now)
+        return ()
 
     def _on_command(self, sender: Address, command: CommandLong, now: float) -> list[Message]:
         result, answers = ACCEPTED, list[Message]()
         match command.command:
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5, now)
-                why = self._why_not_armed() if result == self.behaviour.not_armed else None
+                why = self._why_not_armed() if result == self.behaviour.denied else None
                 if why is not None:
-                    text = self.behaviour.not_armed_text.format(why)
-                    answers.append(Statustext(protocol.MavSeverity.CRITICAL, text))
+                    answers.append(Statustext(MavSeverity.CRITICAL, f"Arm: {why}"))
             case MavCommand.TAKEOFF:
                 climbs = self.flight.take_off(command.param7, self._clock(now))
                 result = ACCEPTED if climbs else DENIED
@@ -223,14 +280,19 @@ class MockAutopilot(Machine[None]):
                 self.flight.enter(self.flight.modes.mission, self._clock(now))
                 result = self._begin(now)
             case MavCommand.SET_MODE:
-                result = self._set_mode(self.behaviour.requested_mode(command), now)
+                flags, main, sub = map(whole, (command.param1, command.param2, command.param3))
+                custom = flags > 0 and flags & _CUSTOM_MODE
+                mode = self.behaviour.requested_mode(main, sub) if custom else None
+                result = self.behaviour.no_mode if mode is None else self._set_mode(mode, now)
             case MavCommand.SET_CURRENT:
-                found = self._set_current(whole(command.param1), now)
-                result = ACCEPTED if found else DENIED
-                answers += found
-            case MavCommand.REQUEST_MESSAGE | MavCommand.REQUEST_CAPABILITIES as asked:
-                by_number = asked == MavCommand.REQUEST_MESSAGE
-                kind = whole(command.param1) if by_number else _AUTOPILOT_VERSION
+                known = whole(command.param1) in range(len(self.lists.items(MissionType.MISSION)))
+                result = ACCEPTED if known else DENIED
+                if known:
+                    self._current = whole(command.param1)
+                    answers.append(self._mission_current(now))
+            case MavCommand.REQUEST_MESSAGE | MavCommand.REQUEST_CAPABILITIES as request:
+                by_number = request == MavCommand.REQUEST_MESSAGE
+                kind = whole(command.param1) if by_number else protocol.AUTOPILOT_VERSION
                 answers += self._asked_for(kind)
                 result = ACCEPTED if answers else UNSUPPORTED
             case MavCommand.SET_INTERVAL if command.param1 == protocol.CURRENT_MODE:
@@ -243,28 +305,29 @@ class MockAutopilot(Machine[None]):
                 self.reboot(now)
             case _:
                 result = UNSUPPORTED
-        ack = messages.CommandAck(sender, command.command, result)
-        return [ack, *answers]
+        return [messages.CommandAck(sender, command.command, result), *answers]
 
     def _asked_for(self, kind: int) -> list[Message]:
         home = self.home
-        place = (round(home.latitude * 1e7), round(home.longitude * 1e7))
-        if kind == _AUTOPILOT_VERSION:
-            return [messages.AutopilotVersion(_CAPABILITIES, 0x04_06_00_FF, self.address.system)]
-        if kind == protocol.POSITION:
-            return self._place_reports(self._now)[:1]
-        spot = {
-            protocol.HOME_POSITION: messages.HomePosition,
-            protocol.LOCAL_ORIGIN: messages.GpsGlobalOrigin,
-        }.get(kind)
-        return [] if spot is None else [spot(*place, round(home.altitude * 1000))]
+        spot = round(home.latitude * 1e7), round(home.longitude * 1e7), round(home.altitude * 1000)
+        match kind:
+            case protocol.AUTOPILOT_VERSION:
+                version = 0x04_06_00_FF
+                return [messages.AutopilotVersion(_CAPABILITIES, version, self.address.system)]
+            case protocol.POSITION:
+                return self._place_reports(self._now)[:1]
+            case protocol.HOME_POSITION:
+                return [messages.HomePosition(*spot)]
+            case protocol.LOCAL_ORIGIN:
+                return [messages.GpsGlobalOrigin(*spot)]
+        return []
 
     def _arm(self, wanted: bool, now: float) -> int:
         if not wanted:
             self.flight.stop()
             return ACCEPTED
         if self._why_not_armed() is not None:
-            return self.behaviour.not_armed
+            return self.behaviour.denied
         if not self.armed:
             self.flight.arm(self._clock(now))
         return self._begin(now) if self.mode == self.flight.modes.mission else ACCEPTED
@@ -282,26 +345,21 @@ class MockAutopilot(Machine[None]):
         outside = self.behaviour.armed_inside_only and self.flight.home_outside(fence)
         return "Vehicle breaching Polygon fence" if outside else None
 
-    def _set_mode(self, mode: int | None, now: float) -> int:
+    def _set_mode(self, mode: int, now: float) -> int:
         modes, clock = self.flight.modes, self._clock(now)
-        if mode is None:
-            return self.behaviour.no_mode
         if mode == modes.mission and self._problem():
-            return self.behaviour.mode_denied
+            return self.behaviour.denied
         if mode == modes.guided and not self.flight.accepts_guided(clock):
-            return self.behaviour.mode_denied
+            return self.behaviour.denied
         self.flight.enter(mode, clock)
         return self._begin(now) if mode == modes.mission else ACCEPTED
 
     def _problem(self) -> str:
         """Return why what is stored cannot be flown, "" if it can."""
         try:
-            mission = self.mission()
+            return "" if self.mission().items else "no mission"
         except InputError as error:  # peers store what they like
             return str(error)
-        if not mission.items:
-            return "no mission"
-        return self.behaviour.infeasible(mission)
 
     def _begin(self, now: float) -> int:
         """Fly the mission, once armed and told to; not a second time."""
@@ -310,66 +368,8 @@ class MockAutopilot(Machine[None]):
         mission = replace(self.mission(), home=self.home)
         return ACCEPTED if self.flight.begin(mission, self._clock(now)) else DENIED
 
-    def _follow(self, now: float) -> list[Message]:
-        """Let the flight go on, and tell what becomes of it."""
-        flight, clock, first = self.flight, self._clock(now), self._first_number()
-        out: list[Message] = [messages.MissionItemReached(n + first) for n in flight.reached(clock)]
-        before = flight.mode
-        if flight.at_fence(clock) is not None:
-            out.append(Statustext(protocol.MavSeverity.CRITICAL, self.behaviour.fence_text))
-        flight.lose_setpoints(clock)
-        current = flight.aircraft.at(clock).item + first
-        if flight.on_mission and current != self._current:
-            self._current = current
-            rows = self.lists.items(MissionType.MISSION)
-            returns = (
-                rows[current : current + 1]
-                and rows[current].command == Command.NAV_RETURN_TO_LAUNCH
-            )
-            if self.vehicle.kind in self.behaviour.returns_by_mode and returns:
-                flight.mode = flight.modes.at_fence.get("return", flight.mode)
-            out.append(self._mission_current(now))
-        if flight.aircraft.landed(clock):
-            flight.land()
-            out.append(Statustext(protocol.MavSeverity.INFO, "Landed, disarming"))
-        if (flight.mode, flight.armed) != (before, True):
-            out.append(self._heartbeat())
-        return out
 
-    def _first_number(self) -> int:
-        return home_items(self.vehicle, MissionType.MISSION)
-
-    def _set_current(self, seq: int, now: float) -> list[Message]:
-        if not 0 <= seq < len(self.lists.items(MissionType.MISSION)):
-            return []
-        self._current = seq
-        return [self._mission_current(now)]
-
-    def _mission_current(self, now: float) -> Message:
-        total = len(self.lists.items(MissionType.MISSION)) - self._first_number()
-        # MISSION_STATE: none, not started, active
-        state = 1 if total == 0 else 3 if self.flight.on_mission else 2
-        if self.flight.on_mission and self._clock(now) >= self.flight.aircraft.arrives:
-            state = protocol.MISSION_COMPLETE
-        number = self.lists.number(MissionType.MISSION) if self.behaviour.numbers_lists else 0
-        return messages.MissionCurrent(self._current, max(total, 0), state, number)
-
-    def _system_status(self) -> list[Message]:
-        """Return that its checks pass, once it is ready, and how its battery is."""
-        passes = protocol.PREARM_CHECK * self._is_ready()
-        return [
-            messages.SysStatus(passes, 12_600, self._battery),
-            messages.BatteryStatus(0, 1, self._battery),
-        ]
-
-    def _heartbeat(self) -> Message:
-        if not self._is_ready():
-            state = protocol.MavState.CALIBRATING
-        else:
-            state = protocol.MavState.ACTIVE if self.armed else protocol.MavState.STANDBY
-        autopilot, is_mission = (
-            self.vehicle.family.mav_autopilot,
-            self.mode == self.flight.modes.mission,
-        )
-        base_mode = _CUSTOM_MODE | _AUTO * is_mission | protocol.ARMED * self.armed
-        return messages.Heartbeat(self.vehicle.mav_types[0], autopilot, base_mode, self.mode, state)
+def _fitted(value: float, bits: int) -> int:
+    """Return what a field of so many bits holds: 300 m/s and more are cut."""
+    most = (1 << bits - 1) - 1
+    return round(min(max(value, -most), most))

@@ -4,13 +4,7 @@ import math
 from collections.abc import Mapping
 
 from faao_mav.autopilot import VehicleType
-from faao_mav.wire.messages import (
-    Message,
-    ParamRequestList,
-    ParamRequestRead,
-    ParamSet,
-    ParamValue,
-)
+from faao_mav.wire.messages import Message, ParamRequestList, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.parameters import Setting, on_the_wire, setting_in
 
 _INT32, _REAL32 = 6, 9
@@ -42,10 +36,10 @@ class ParameterServer:
         """Return the answer to a request; unknown names get none."""
         names = list(self.values)
         match message:
-            case ParamRequestRead(param_index=-1, param_id=name):
-                names = [name] if name in self.values else []
-            case ParamRequestRead(param_index=index):
+            case ParamRequestRead(param_index=index) if index != -1:
                 names = names[index : index + 1] if index >= 0 else []
+            case ParamRequestRead(param_id=name):
+                names = [name] if name in self.values else []
             case ParamSet(param_id=name):
                 names = [name] if self._takes(message) else []
         return [self._value(name) for name in names]

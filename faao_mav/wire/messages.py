@@ -88,12 +88,6 @@ class MissionClearAll(ListMessage):
     """MISSION_CLEAR_ALL."""
 
 
-class MissionSetCurrent(Addressed):
-    """MISSION_SET_CURRENT."""
-
-    seq: int
-
-
 class MissionCurrent(Message):
     """MISSION_CURRENT; `total` leaves out ArduPilot's home item, 0 is for none.
 

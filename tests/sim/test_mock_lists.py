@@ -4,7 +4,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import pytest
 from stations import FOREIGN, HOME, VEHICLE, Desk, mock_of, places, rows_for
 
 from faao_mav.sim import Behaviour, behaviour_of
@@ -22,7 +21,6 @@ from faao_mav.wire.messages import (
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 
 MISSION, FENCE, RALLY = MissionType
-TO = VEHICLE
 PLACE = (-353_000_000, 1_491_000_000)
 RALLY_ROW = WireItem(5100, 3, (0.0, 0.0, 0.0, 0.0), *PLACE, 30.0)
 
@@ -34,11 +32,11 @@ def desk_for(kind: str | Behaviour, **options: Any) -> Desk:
 
 
 def count(n: int, part: int = MISSION) -> MissionCount:
-    return MissionCount(TO, part, n)
+    return MissionCount(VEHICLE, part, n)
 
 
 def item(seq: int, row: WireItem, part: MissionType = MISSION) -> MissionItemInt:
-    return MissionItemInt(TO, part, seq, row)
+    return MissionItemInt(VEHICLE, part, seq, row)
 
 
 def results(messages: Sequence[Message]) -> list[int]:
@@ -47,10 +45,6 @@ def results(messages: Sequence[Message]) -> list[int]:
 
 def asked(messages: Sequence[Message]) -> list[int]:
     return [message.seq for message in messages if isinstance(message, MissionRequestInt)]
-
-
-def said(messages: Sequence[Message]) -> list[str]:
-    return [message.text for message in messages if isinstance(message, Statustext)]
 
 
 def upload(
@@ -85,22 +79,11 @@ def test_an_upload_that_stops_is_asked_for_and_given_up() -> None:
         assert asked(desk.wait(1.01)) == [3] * asks
         out = desk.wait(patience - 1.0)
         assert results(out) == answers
-        assert any("imeout" in text for text in said(out))
+        assert any(isinstance(each, Statustext) and "timeout" in each.text for each in out)
         assert asked(desk.wait(9.0)) == []
         assert stored(desk) == places((*new[:3], *old[3:]) if kind == "ardupilot" else old)
         assert results(desk.tell(item(3, new[3]))) == [MavResult.ERROR]
         assert upload(desk, new) == [MavResult.ACCEPTED]
-
-
-@pytest.mark.parametrize("complete_only", [True, False])
-def test_a_late_item_of_an_upload_that_px4_gave_up(complete_only: bool) -> None:
-    desk, rows = desk_for(behaviour_of("px4", complete_only=complete_only)), rows_for("px4", 3)
-    desk.tell(count(3))
-    desk.tell(item(0, rows[0]))
-    desk.wait(6)
-    late = MavResult.ERROR if complete_only else MavResult.ACCEPTED
-    assert results(desk.tell(item(0, rows[0]))) == [late]
-    assert stored(desk) == []
 
 
 def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4() -> None:
@@ -128,12 +111,9 @@ def test_ardupilot_takes_two_lists_at_once_px4_does_not() -> None:
 
 
 def test_what_is_no_list_or_does_not_fit() -> None:
-    for kind, limit, unknown in (
-        ("ardupilot", 655, MavResult.UNSUPPORTED),
-        ("px4", 1000, MavResult.INVALID),
-    ):
+    for kind, limit in (("ardupilot", 655), ("px4", 1000)):
         desk = desk_for(kind)
-        assert results(desk.tell(count(1, 230))) == [unknown]
+        assert results(desk.tell(count(1, 230))) == [MavResult.UNSUPPORTED]
         assert results(desk.tell(count(limit + 1))) == [MavResult.NO_SPACE]
         assert asked(desk.tell(count(limit))) == [0]
     desk = desk_for("ardupilot", boot=5.0)
@@ -154,24 +134,19 @@ def test_clearing_one_list_leaves_the_others() -> None:
         desk = desk_for(kind)
         upload(desk, rows_for(kind, 3))
         upload(desk, (RALLY_ROW,), RALLY)
-        assert results(desk.tell(MissionClearAll(TO, 0))) == [MavResult.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(VEHICLE, 0))) == [MavResult.ACCEPTED]
         assert (stored(desk), len(stored(desk, RALLY))) == ([], 1)
-        assert results(desk.tell(MissionClearAll(TO, 255))) == [MavResult.ACCEPTED]
+        assert results(desk.tell(MissionClearAll(VEHICLE, 255))) == [MavResult.ACCEPTED]
         assert stored(desk, RALLY) == []
 
 
-def test_px4_changes_its_request_when_told_unsupported() -> None:
+def test_px4_changes_its_request_when_told_unsupported_and_is_freed_by_a_cancellation() -> None:
     assert not desk_for("px4").tell(count(3))[0].legacy
     desk = desk_for("px4-legacy-first")
     (request,) = desk.tell(count(3))
-    (other,) = desk.tell(MissionAck(TO, 0, MavResult.UNSUPPORTED))
+    (other,) = desk.tell(MissionAck(VEHICLE, 0, MavResult.UNSUPPORTED))
     assert (request.legacy, other.legacy, other.seq) == (True, False, 0)
-
-
-def test_px4_is_freed_by_a_cancellation() -> None:
-    desk = desk_for("px4")
-    desk.tell(count(3))
-    desk.tell(MissionAck(TO, 0, MavResult.OPERATION_CANCELLED))
+    desk.tell(MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED))
     assert asked(desk.wait(3)) == []
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 
@@ -185,6 +160,7 @@ def test_which_items_are_refused() -> None:
         ("ardupilot", WireItem(16, 3, (0.0, nan, 0, 0), *PLACE, 9.0), MavResult.INVALID_PARAM2),
         ("ardupilot", WireItem(16, 3, none, 910_000_000, 0, 9.0), MavResult.INVALID_PARAM5_X),
         ("ardupilot", WireItem(178, 3, speed, 0, 0, 0.0), MavResult.ACCEPTED),
+        ("px4", WireItem(1, 3, none, *PLACE, 9.0), MavResult.UNSUPPORTED),
         ("px4", WireItem(82, 3, none, *PLACE, 9.0), MavResult.UNSUPPORTED),
         ("px4", WireItem(178, 3, speed, 0, 0, 0.0), MavResult.UNSUPPORTED),
         ("px4", WireItem(178, 2, speed, 0, 0, 0.0), MavResult.ACCEPTED),
@@ -215,7 +191,7 @@ def test_numbers_tell_px4_lists_apart() -> None:
     numbers = []
     for shift in (0.0, 0.1, 0.0):
         upload(desk, rows_for("px4", 3, shift))
-        (found,) = desk.tell(MissionRequestList(TO, 0))
-        desk.tell(MissionAck(TO, 0, MavResult.ACCEPTED))
+        (found,) = desk.tell(MissionRequestList(VEHICLE, 0))
+        desk.tell(MissionAck(VEHICLE, 0, MavResult.ACCEPTED))
         numbers.append(found.opaque_id)
     assert numbers[0] == numbers[2] != numbers[1]

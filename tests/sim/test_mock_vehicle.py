@@ -1,6 +1,5 @@
 """The rest of the mock autopilot: heartbeats, commands, parameters, flight."""
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -29,11 +28,9 @@ from faao_mav.wire.messages import (
     MissionClearAll,
     MissionCurrent,
     MissionItemReached,
-    MissionSetCurrent,
     ParamRequestList,
     ParamRequestRead,
     ParamSet,
-    ParamValue,
     SetMode,
     SetPositionTargetLocalNed,
     Statustext,
@@ -44,12 +41,8 @@ from faao_mav.wire.wire_items import wire_items
 
 T = TypeVar("T", bound=Message)
 
-TO = VEHICLE
-MISSION = (MissionType.MISSION, vehicle_of("ardupilot"))
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
-
-
 STILL = SetPositionTargetLocalNed(VEHICLE, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 0, 0)
 """A setpoint 20 m above home."""
 
@@ -58,14 +51,13 @@ def desk_for(kind: MockKind, mission: Mission | None = None, **options: Any) -> 
     mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, **options)
     desk = Desk(mock, GROUND_STATION)
     desk.start()
-    if mission is not None:
-        rows = wire_items(mission, MissionType.MISSION, vehicle_of(kind))
-        mock.lists.replace(MissionType.MISSION, rows)
+    for part in MissionType:
+        mock.lists.replace(part, wire_items(mission or Mission(()), part, vehicle_of(kind)))
     return desk
 
 
 def command(number: int, *params: float) -> CommandLong:
-    return CommandLong(TO, number, 0, *map(float, params))
+    return CommandLong(VEHICLE, number, 0, *map(float, params))
 
 
 def result(messages: Sequence[Message]) -> int:
@@ -89,6 +81,11 @@ def take_off(desk: Desk, kind: MockKind) -> None:
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
 
 
+def height(desk: Desk, seconds: float) -> float:
+    """Return how high it is after a while, m above home."""
+    return only(desk.wait(seconds), GlobalPositionInt)[-1].relative_alt / 1000
+
+
 @BOTH
 def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind: MockKind) -> None:
     desk = desk_for(kind, boot=3.0)
@@ -100,15 +97,13 @@ def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind: MockKind) -> N
 
 @BOTH
 def test_a_whole_flight(kind: MockKind) -> None:
-    mission = a_mission(12)
-    desk = desk_for(kind, mission, speedup=10.0)
+    desk = desk_for(kind, a_mission(12), speedup=10.0)
     take_off(desk, kind)
     assert desk.machine.armed
     out = desk.wait(60.0)
     assert not desk.machine.armed
     first = 1 if kind == "ardupilot" else 0
-    reached = [message.seq for message in only(out, MissionItemReached)]
-    assert reached == [*range(first, first + 11), first + 11]
+    assert [message.seq for message in only(out, MissionItemReached)] == [*range(first, first + 12)]
     heights = [message.relative_alt / 1000 for message in only(out, GlobalPositionInt)]
     assert max(heights) == pytest.approx(30.0, abs=0.1)
     assert heights[-1] == 0
@@ -117,19 +112,14 @@ def test_a_whole_flight(kind: MockKind) -> None:
     assert only(out, Heartbeat)[-1].base_mode & 128 == 0
 
 
-def test_a_plane_has_its_own_number_modes_and_storage() -> None:
-    items = list(a_mission(5).items)
-    items[2] = dataclasses.replace(items[2], params=(7.0, 40.0, 0.0, 0.0))
-    desk = desk_for("ardupilot", Mission(tuple(items), HOME), aircraft="plane", speedup=20.0)
+def test_a_plane_has_its_own_number_and_modes() -> None:
+    desk = desk_for("ardupilot", a_mission(5), aircraft="plane", speedup=20.0)
     assert result(desk.tell(command(400, 1))) == 0
     assert result(desk.tell(SetMode(1, 1, AUTO["ardupilot"]))) == 0  # TRAINING, for a plane
-    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt == 0
+    assert height(desk, 2.0) == 0
     assert result(desk.tell(SetMode(1, 1, 10))) == 0
-    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt > 0
+    assert height(desk, 2.0) > 0
     assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
-    row = wire_items(Mission(tuple(items), HOME), *MISSION)[3]
-    kept = desk.machine.lists.kept(MissionType.MISSION, 3, row)
-    assert kept.params[:2] == (0.0, 40.0)
 
 
 def test_positions_are_those_of_the_track() -> None:
@@ -158,22 +148,22 @@ def test_a_waypoint_before_a_do_item_is_told_by_the_do_items_number() -> None:
 
 
 @BOTH
-def test_it_does_not_fly_without_being_armed_and_told_to(kind: MockKind) -> None:
-    desk = desk_for(kind, a_mission(5))
-    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
-    assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt == 0
-    desk = desk_for(kind, a_mission(5))
-    assert result(desk.tell(command(400, 1))) == 0
-    assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt == 0
-    assert result(desk.tell(command(300))) == 0
-    assert only(desk.wait(5.0), GlobalPositionInt)[-1].relative_alt > 0
-
-
-@BOTH
-def test_without_a_mission_there_is_nothing_to_fly(kind: MockKind) -> None:
+def test_it_does_not_fly_without_a_mission_or_without_being_armed_and_told_to(
+    kind: MockKind,
+) -> None:
     desk = desk_for(kind)
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == {"ardupilot": 4, "px4": 1}[kind]
     assert result(desk.tell(command(300))) == 2
+    desk = desk_for(kind, a_mission(5))
+    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
+    assert height(desk, 5.0) == 0
+    desk = desk_for(kind, a_mission(5))
+    assert result(desk.tell(command(400, 1))) == 0
+    assert height(desk, 5.0) == 0
+    assert result(desk.tell(command(300))) == 0
+    assert height(desk, 5.0) > 0
+    (ack,) = desk.tell(MissionClearAll(VEHICLE, 0))
+    assert ack.type == (MavResult.ERROR if kind == "ardupilot" else MavResult.ACCEPTED)
 
 
 def test_a_mode_is_asked_for_as_each_autopilot_has_it() -> None:
@@ -191,34 +181,13 @@ def test_a_mode_is_asked_for_as_each_autopilot_has_it() -> None:
     assert px4.machine.mode == px4_mode(4, 6)
 
 
-def test_px4_takes_what_it_will_not_fly() -> None:
-    mission = a_mission(5)
-    low = dataclasses.replace(mission.items[0], z=0.0)
-    for items in (
-        (low, *mission.items[1:]),
-        (*mission.items[1:3], mission.items[0], mission.items[3]),
-        (MissionItem(21, 3, x=-35.0, y=149.0), *mission.items[1:]),
-        (*mission.items, MissionItem(112, 2, (5.0, 0.0, 0.0, 0.0))),
-    ):
-        desk = desk_for("px4", Mission(items, HOME))
-        assert result(desk.tell(command(176, 1, 4, 4))) == 1
-    assert result(desk_for("px4", mission).tell(command(176, 1, 4, 4))) == 0
-
-
-def test_ardupilot_does_not_clear_what_it_flies() -> None:
-    desk = desk_for("ardupilot", a_mission(5))
-    take_off(desk, "ardupilot")
-    (ack,) = desk.tell(MissionClearAll(TO, 0))
-    assert ack.type == MavResult.ERROR
-
-
 @BOTH
 def test_a_mission_is_broken_off_and_flown_on(kind: MockKind) -> None:
     """In another mode it holds its place, or returns; disarmed it stands at home."""
     desk = desk_for(kind, a_mission(12))
     take_off(desk, kind)
     desk.tell(SetMode(1, 1, 0))
-    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt == 0
+    assert height(desk, 2.0) == 0
     assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
     desk.wait(20.0)
     there = desk.machine.posture(desk.now)
@@ -234,37 +203,39 @@ def test_a_mission_is_broken_off_and_flown_on(kind: MockKind) -> None:
     assert desk.machine.posture(desk.now).position == pytest.approx([0, 0, 0])
     desk.tell(SetMode(1, 1, AUTO[kind]))
     assert result(desk.tell(command(400, 1))) == 0
-    assert only(desk.wait(3.0), GlobalPositionInt)[-1].relative_alt > 0
+    assert height(desk, 3.0) > 0
     assert result(desk.tell(command(400, 0))) == 0
-    assert only(desk.wait(2.0), GlobalPositionInt)[-1].relative_alt == 0
+    assert height(desk, 2.0) == 0
 
 
 @BOTH
 def test_what_ground_stations_ask_for(kind: MockKind) -> None:
-    desk = desk_for(kind)
+    desk = desk_for(kind, a_mission(5))
     ack, version = desk.tell(command(512, 148))
     assert (ack.result, type(version)) == (0, AutopilotVersion)
     assert version.capabilities & 4
     ack, home = desk.tell(command(512, 242))
     assert home == HomePosition(-353_632_620, 1_491_652_370, 584_000)
-    assert result(desk.tell(command(512, 30))) == 3
-    assert result(desk.tell(command(511, 33, 1e5))) == 0
-    assert result(desk.tell(command(520, 1))) == 0
-    assert result(desk.tell(command(31_000))) == 3
+    for params, expected in (
+        ((512, 30), 3),
+        ((511, 33, 1e5), 0),
+        ((520, 1), 0),
+        ((31_000,), 3),
+        ((224, 2), 0),
+        ((224, 99), 2),
+    ):
+        assert result(desk.tell(command(*params))) == expected
+    for to in (Address(2, 1), Address(1, 154)):
+        assert desk.tell(CommandLong(to, 400, 0, 1.0)) == []
 
 
 @BOTH
-def test_no_command_brings_it_down(kind: MockKind) -> None:
-    nan, inf = float("nan"), float("inf")
-    for value in (nan, inf, -1.0, 1e30):
+def test_no_command_and_no_setpoint_brings_it_down(kind: MockKind) -> None:
+    for value in (math.nan, math.inf, -1.0, 1e30):
         desk = desk_for(kind, a_mission(3))
         for number in (176, 224, 300, 400, 22, 511, 512, 520, 16, 0, 65_535):
             desk.tell(command(number, *[value] * 7))
             assert only(desk.wait(2.0), Heartbeat), number
-
-
-@BOTH
-def test_no_setpoint_brings_it_down(kind: MockKind) -> None:
     desk = desk_for(kind)
     stream(desk)
     assert result(desk.tell(SetMode(1, 1, desk.machine.flight.modes.guided))) == 0
@@ -292,30 +263,19 @@ def test_where_it_has_come_to_it_is_due_for_its_reports_only() -> None:
 @BOTH
 def test_parameters(kind: MockKind) -> None:
     desk = desk_for(kind)
-    values = desk.tell(ParamRequestList(TO))
+    values = desk.tell(ParamRequestList(VEHICLE))
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
     vehicle = desk.machine.vehicle
     told = {value.param_id: setting_in(value, vehicle).value for value in values}
     assert told.items() >= vehicle.defaults().items()
     second = values[1]
-    assert desk.tell(ParamRequestRead(TO, "", 1)) == [second]
-    assert desk.tell(ParamRequestRead(TO, second.param_id, -1)) == [second]
-    assert desk.tell(ParamRequestRead(TO, "NO_SUCH", -1)) == []
-    assert desk.tell(ParamRequestRead(TO, "", 999)) == []
-    (changed,) = desk.tell(ParamSet(TO, second.param_id, 7.0, 9))
-    assert isinstance(changed, ParamValue)
+    assert desk.tell(ParamRequestRead(VEHICLE, "", 1)) == [second]
+    assert desk.tell(ParamRequestRead(VEHICLE, second.param_id, -1)) == [second]
+    assert desk.tell(ParamRequestRead(VEHICLE, "NO_SUCH", -1)) == []
+    assert desk.tell(ParamRequestRead(VEHICLE, "", 999)) == []
+    (changed,) = desk.tell(ParamSet(VEHICLE, second.param_id, 7.0, 9))
     assert changed.param_value == 7.0
-
-
-@BOTH
-def test_the_current_item(kind: MockKind) -> None:
-    desk = desk_for(kind, a_mission(5))
-    (current,) = desk.tell(MissionSetCurrent(TO, 3))
-    assert (current.seq, current.total) == (3, 5)
-    assert desk.tell(MissionSetCurrent(TO, 99)) == []
-    assert result(desk.tell(command(224, 2))) == 0
-    assert result(desk.tell(command(224, 99))) == 2
 
 
 def test_a_reboot_keeps_what_is_stored() -> None:
@@ -332,18 +292,10 @@ def test_a_reboot_keeps_what_is_stored() -> None:
     assert result(desk.tell(command(400, 1))) == 0
 
 
-def test_commands_to_others_are_not_obeyed() -> None:
-    desk = desk_for("px4")
-    assert desk.tell(CommandLong(Address(2, 1), 400, 0, 1.0)) == []
-    assert desk.tell(CommandLong(Address(1, 154), 400, 0, 1.0)) == []
-    assert not desk.machine.armed
-
-
-HEIGHT = 20.0
 OUT = Mission(
     (
-        MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=HEIGHT),
-        MissionItem(16, 3, x=HOME.latitude + 0.002, y=HOME.longitude, z=HEIGHT),
+        MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=20.0),
+        MissionItem(16, 3, x=HOME.latitude + 0.002, y=HOME.longitude, z=20.0),
         MissionItem(20, 2),
     ),
     HOME,
@@ -351,75 +303,50 @@ OUT = Mission(
 )
 """To a place 222 m to the north of home, with a fence at 100 m."""
 
+RTL, HOLD = 6, 4 << 16 | 3 << 24
 
-def breach(kind: MockKind, **parameters: float) -> Desk:
-    """Fly `OUT` for five minutes."""
-    desk = desk_for(kind, OUT, rate=4.0, parameters=parameters)
-    rows = wire_items(OUT, MissionType.FENCE, vehicle_of(kind))
-    desk.machine.lists.replace(MissionType.FENCE, rows)
+
+@pytest.mark.parametrize(
+    ("kind", "parameters", "farthest", "end", "modes", "told"),
+    [
+        ("ardupilot", {"FENCE_ENABLE": 1}, 102, (0, 0), [0, 3, RTL], True),
+        ("ardupilot", {}, 222, (0, 0), [0, 3], False),
+        ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_ACTION": 0}, 222, (0, 0), [0, 3], True),
+        ("px4", {}, 102, (102, 20), [HOLD, AUTO["px4"], HOLD], True),
+        ("px4", {"GF_ACTION": 3}, 102, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)], True),
+        ("px4", {"GF_ACTION": 5}, 102, (102, 0), [HOLD, AUTO["px4"], px4_mode(4, 6)], True),
+        ("px4", {"GF_ACTION": 0}, 222, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)], False),
+        ("px4", {"GF_ACTION": 1}, 222, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)], True),
+    ],
+)
+def test_at_its_fence_it_does_what_its_parameters_say(
+    kind: MockKind,
+    parameters: dict[str, float],
+    farthest: float,
+    end: tuple[float, float],
+    modes: list[int],
+    told: bool,
+) -> None:
+    """ArduPilot returns, PX4 holds by default; where it is not to be kept it flies on."""
+    desk = desk_for(kind, OUT, parameters=parameters)
     take_off(desk, kind)
     desk.wait(300.0)
-    return desk
-
-
-def farthest_and_last(desk: Desk) -> tuple[float, float, float]:
-    """Return how far north it got, m, and where it ended, metres north and up."""
-    places = only(desk.sent, GlobalPositionInt)
-    north = [(place.lat * 1e-7 - HOME.latitude) * 111_000 for place in places]
-    return max(north), north[-1], places[-1].relative_alt / 1000
-
-
-def test_ardupilot_goes_home_from_its_fence() -> None:
-    desk = breach("ardupilot", FENCE_ENABLE=1)
-    north, end, height = farthest_and_last(desk)
-    assert 100 < north < 125
-    assert (end, height) == pytest.approx((0, 0), abs=0.1)
-    assert not desk.machine.armed
-    modes = [beat.custom_mode for beat in only(desk.sent, Heartbeat)]
-    assert list(dict.fromkeys(modes)) == [0, 3, 6]
-    texts = [text.text for text in only(desk.sent, Statustext)]
-    assert texts == ["Polygon fence breached", "Landed, disarming"]
-
-
-def test_px4_holds_at_its_fence() -> None:
-    desk = breach("px4")
-    north, end, height = farthest_and_last(desk)
-    assert 100 < north < 125
-    assert 100 < end < north
-    assert height == pytest.approx(HEIGHT)
-    assert desk.machine.armed
-    assert only(desk.sent, Heartbeat)[-1].custom_mode == 4 << 16 | 3 << 24
-
-
-def test_px4_may_be_told_to_return_or_land() -> None:
-    _, end, height = farthest_and_last(breach("px4", GF_ACTION=3))
-    assert (end, height) == pytest.approx((0, 0), abs=0.1)
-    north, end, height = farthest_and_last(breach("px4", GF_ACTION=5))
-    assert (end, height) == pytest.approx((north, 0), abs=0.1)
-
-
-def test_a_fence_that_is_not_to_be_kept() -> None:
-    for kind, parameters, told in (
-        ("ardupilot", {}, False),
-        ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_ACTION": 0}, True),
-        ("px4", {"GF_ACTION": 0}, False),
-        ("px4", {"GF_ACTION": 1}, True),
-    ):
-        desk = breach(cast(MockKind, kind), **cast(dict[str, float], parameters))
-        north, end, height = farthest_and_last(desk)
-        assert north == pytest.approx(222, abs=1)
-        assert (end, height) == pytest.approx((0, 0), abs=0.1)
-        assert told == any("ence" in text.text for text in only(desk.sent, Statustext))
+    flown = only(desk.sent, GlobalPositionInt)
+    north = [(place.lat * 1e-7 - HOME.latitude) * 111_000 for place in flown]
+    assert max(north) == pytest.approx(farthest, abs=3)
+    assert (north[-1], flown[-1].relative_alt / 1000) == pytest.approx(end, abs=3)
+    assert desk.machine.armed == (end[1] > 0)
+    changes = [beat.custom_mode for beat in only(desk.sent, Heartbeat)]
+    assert [m for m, before in zip(changes, [None, *changes], strict=False) if m != before] == modes
+    assert told == any("fence" in text.text for text in only(desk.sent, Statustext))
 
 
 def test_ardupilot_does_not_arm_outside_its_fence() -> None:
     away = Fence(circles=(Circle((HOME.latitude + 0.01, HOME.longitude), 100.0, inclusion=True),))
     for kind, parameters, expected in (
-        ("ardupilot", {"FENCE_ENABLE": 1}, 4),
+        ("ardupilot", {"FENCE_ENABLE": 1.0}, 4),
         ("ardupilot", {}, 0),
         ("px4", {}, 0),
     ):
-        desk = desk_for(cast(MockKind, kind), OUT, parameters=parameters)
-        rows = wire_items(replace(OUT, fence=away), MissionType.FENCE, vehicle_of(kind))
-        desk.machine.lists.replace(MissionType.FENCE, rows)
+        desk = desk_for(cast(MockKind, kind), replace(OUT, fence=away), parameters=parameters)
         assert result(desk.tell(command(400, 1))) == expected

@@ -27,7 +27,7 @@ from faao_mav.autopilot import PX4_COPTER, register, unregister
 from faao_mav.errors import LinkError
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults, Lost
-from faao_mav.sim.lists import StoredLists
+from faao_mav.sim.lists import Lists
 from faao_mav.wire.discover import choose, discover
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
@@ -68,12 +68,11 @@ def vehicle_holds(
 
 
 @settings(max_examples=200)
-@given(st.sampled_from([*KINDS, "px4-late-items"]), st.integers(2, 12), bad_links, st.booleans())
+@given(st.sampled_from(KINDS), st.integers(2, 12), bad_links, st.booleans())
 def test_no_wrong_mission_is_ever_called_verified(
-    kind: str, count: int, faults: Faults, occupied: bool
+    kind: MockKind, count: int, faults: Faults, occupied: bool
 ) -> None:
-    manners = behaviour_of("px4", complete_only=False) if kind == "px4-late-items" else kind
-    mock = mock_of(manners)
+    mock = mock_of(kind)
     firmware = mock.behaviour.family.key
     if occupied:
         mock.lists.replace(MISSION, rows_for(firmware, 7, shift=0.1))
@@ -196,7 +195,7 @@ def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind) -> None:
 def test_an_accepted_fence_that_is_lost_is_sent_again() -> None:
     """A real ArduPilot reads back an empty fence after about one of twelve uploads."""
 
-    class Loses(StoredLists):
+    class Loses(Lists):
         times = 2
 
         def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
@@ -239,7 +238,7 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, wh
 
 
 def test_a_vehicle_that_stores_something_else_is_found_out() -> None:
-    class Forgetful(StoredLists):
+    class Forgetful(Lists):
         def kept(self, part: MissionType, seq: int, row: WireItem) -> WireItem:
             kept = super().kept(part, seq, row)
             return super().kept(part, seq, rows_for("px4", 8)[3]) if seq == 5 else kept
