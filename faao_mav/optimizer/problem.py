@@ -262,6 +262,7 @@ def build_problem(plan: Plan) -> Problem:
         transmit: int,
         power: float,
         noise: float,
+        law: PathGain,
     ) -> Link:
         match radio.fading:
             case "realization":
@@ -280,7 +281,7 @@ def build_problem(plan: Plan) -> Problem:
             receive=receive,
             transmit=transmit,
             modulation=radio.modulation,
-            law=PathGain(radio.reference_gain),
+            law=law,
             rician_factor=radio.rician_factor,
             line_of_sight=radio.line_of_sight,
             nlos=nlos,
@@ -298,6 +299,7 @@ def build_problem(plan: Plan) -> Problem:
             base.antennas,
             base.power,
             relay.noise,
+            radio.path_gains[0],
         ),
         uav_user=link(
             "UAV to ground user",
@@ -307,5 +309,6 @@ def build_problem(plan: Plan) -> Problem:
             relay.antennas,
             relay.power,
             user.noise,
+            radio.path_gains[1],
         ),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from faao_mav.autopilot import vehicle_types
 from faao_mav.errors import quote
 from faao_mav.plan.fence import fence_problems
-from faao_mav.plan.fields import listed
+from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.model import PlanContents
 from faao_mav.plan.sections import Flight
@@ -32,6 +32,7 @@ def problems(plan: PlanContents) -> Iterator[str]:
     yield from _vehicle(plan)
     yield from _speeds(plan)
     yield from _relay(plan)
+    yield from _gain(plan)
     yield from _steps(plan.flight)
     yield from _distance(plan)
     yield from _goal(plan)
@@ -111,6 +112,20 @@ def _relay(plan: PlanContents) -> Iterator[str]:
             "radio.causal: true: algorithm1 (optimizer.method) maximises R_avg, whatever of it is "
             "delivered; give radio.causal: false, or method direct"
         )
+
+
+def _gain(plan: PlanContents) -> Iterator[str]:
+    radio, height = plan.radio, plan.flight.altitude
+    own = {"base_station": radio.base_station.gain, "ground_user": radio.ground_user.gain}
+    for law, name in zip(radio.path_gains, own, strict=True):
+        at = law.best_distance(2 * MAX_LOCAL_DISTANCE, height)
+        gain = float(law.db(np.array(at), height))
+        if gain > 0:
+            key = f"radio.{name}.gain" if own[name] else "radio.gain"
+            yield (
+                f"{key}: {gain:.4g} dB at {math.hypot(at, height):.4g} m is more than was sent; "
+                "give what the link has, without the power"
+            )
 
 
 def _steps(flight: Flight) -> Iterator[str]:

@@ -11,12 +11,14 @@ from faao_mav.plan.fields import (
     Number,
     Position,
     Power,
+    Text,
     Whole,
     key,
     linear,
     section,
     watts,
 )
+from faao_mav.radio.gain import PathGain
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
@@ -28,12 +30,45 @@ _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
 
 
 @section
+class GainLaw:
+    """The law of the path gain: reference_gain_db - 10 n log10(d) + c1 s + c2 s^2 + c3 s^3, dB.
+
+    With s = H / d, the sine of the elevation. It may stand in a file of its own.
+    """
+
+    reference_gain_db: Number | None = key(
+        "Power gain at 1 m; null: radio.reference_gain_db.", "[-300, 100] dB", default=None
+    )
+    exponent: Number = key("Exponent n of the distance d.", "[0, 10]", default=2.0)
+    elevation_db: tuple[Number, ...] = key(
+        "Terms c1, c2, c3 over s.",
+        "dB",
+        "at most three numbers [c1, c2, c3]",
+        max_length=3,
+        default=(),
+    )
+    spread_db: Number | None = key(
+        "Standard deviation of shadowing about the law; null: unknown.", "(0, 30] dB", default=None
+    )
+    correlation_m: Number = key(
+        "Distance at which shadowing is correlated by 1/e.", "(0, 10000] m", default=50.0
+    )
+    about: Text = key("What it was found from.", accepted="one line of text", default="")
+
+
+_GAIN_FILE = "a mapping with reference_gain_db, exponent, elevation_db, or the name of a file"
+
+
+@section
 class BaseStation:
     """The base station."""
 
     position: Position = key("Place p_B.", "m")
     antennas: Antennas = key("Antennas N_t.", default=2)
     power: Power = key("Transmit power W_B.", "dBm", name="power_dbm", default=_POWER)
+    gain: GainLaw | None = key(
+        "Path gain of this hop, if another.", accepted=_GAIN_FILE, default=None
+    )
 
 
 @section
@@ -57,6 +92,9 @@ class GroundUser:
     position: Position = key("Place p_U.", "m")
     antennas: Antennas = key("Antennas N_r.", default=2)
     noise: Noise = key("Noise power sigma_G^2.", "dBm", name="noise_dbm", default=_NOISE)
+    gain: GainLaw | None = key(
+        "Path gain of this hop, if another.", accepted=_GAIN_FILE, default=None
+    )
 
 
 @section
@@ -69,6 +107,11 @@ class Radio:
     modulation: Modulation = key("The alphabet of both hops.", default="bpsk")
     reference_gain: Gain = key(
         "Power gain rho_0 at 1 m.", "dB", name="reference_gain_db", default=_GAIN
+    )
+    gain: GainLaw = key(
+        "Path gain of both hops, in dB over distance and elevation.",
+        accepted=_GAIN_FILE,
+        default_factory=GainLaw,
     )
     rician_factor: Number = key("Rician factor K, linear.", "[0, 1e6]", default=3.0)
     line_of_sight: LineOfSight = key(
@@ -109,3 +152,23 @@ class Radio:
     def maximised(self) -> str:
         """The name of the rate that is maximised."""
         return "R_del" if self.causal else "R_avg"
+
+    @property
+    def gain_laws(self) -> tuple[GainLaw, GainLaw]:
+        """What the plan says of the path gain of each hop, BS to UAV and UAV to user."""
+        return self.base_station.gain or self.gain, self.ground_user.gain or self.gain
+
+    @property
+    def path_gains(self) -> tuple[PathGain, PathGain]:
+        """The path gain of each hop."""
+        first, second = (
+            PathGain(
+                self.reference_gain
+                if law.reference_gain_db is None
+                else linear(law.reference_gain_db),
+                law.exponent,
+                law.elevation_db,
+            )
+            for law in self.gain_laws
+        )
+        return first, second

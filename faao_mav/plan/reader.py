@@ -15,6 +15,7 @@ from pydantic_core import ErrorDetails
 from faao_mav.autopilot import Vehicle
 from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.files import read_text
+from faao_mav.plan.beside import filled_in
 from faao_mav.plan.checks import problems
 from faao_mav.plan.fence import geofence, written_out
 from faao_mav.plan.keys import PlanKey, reference
@@ -113,14 +114,16 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
         if isinstance(section, dict):
             section["method"] = method
         text = dump_yaml(data)
+    # a copy of the text, as beside a result, has to stand without the files that it names
+    if files := dict(filled_in(data, source)):
+        text = dump_yaml(data)
     try:
         contents = _adapter().validate_python(data, context={})
     except ValidationError as error:
-        raise PlanError(_describe(error, source)) from None
+        raise PlanError(_describe(error, source, files)) from None
     held = {field.name: getattr(contents, field.name) for field in fields(contents)}
     fence = geofence(contents, source)
     if contents.fence is not None and contents.fence.file is not None:
-        # a copy of the text, as beside a result, has to stand without the file
         data["fence"] = written_out(fence, contents.fence.margin)
         text = dump_yaml(data)
     plan = Plan(**held, text=text, source=source, geofence=fence, made_by=_READ)
@@ -165,19 +168,24 @@ def _adapter() -> TypeAdapter[PlanFile]:
     return TypeAdapter(PlanFile)
 
 
-def _describe(error: ValidationError, source: str) -> str:
-    """Return one line per finding (at most `_MAX_LINES`), each naming `source`."""
+def _describe(error: ValidationError, source: str, files: Mapping[tuple[str, ...], str]) -> str:
+    """Return one line per finding (at most `_MAX_LINES`), each naming `source`.
+
+    `files` are those that the values below some keys come from.
+    """
     details = error.errors(include_url=False)
     inside = {d["loc"][:k] for d in details for k in range(len(d["loc"]))}
     # of a list whose items are wrong pydantic also says that it is too short
     own = [d for d in details if d["type"] != "too_short" or d["loc"] not in inside]
-    lines = list(dict.fromkeys(islice(_lines(own), _MAX_LINES)))
+    lines = list(dict.fromkeys(islice(_lines(own, files), _MAX_LINES)))
     if len(own) > _MAX_LINES:
         lines.append(f"and {len(own) - _MAX_LINES} more")
     return "\n".join(f"{source}: {line}" for line in lines)
 
 
-def _lines(details: Sequence[ErrorDetails]) -> Iterator[str]:
+def _lines(
+    details: Sequence[ErrorDetails], files: Mapping[tuple[str, ...], str]
+) -> Iterator[str]:
     known = reference()
     for detail in details:
         value, kind, loc = detail["input"], detail["type"], detail["loc"]
@@ -197,7 +205,10 @@ def _lines(details: Sequence[ErrorDetails]) -> Iterator[str]:
             problem = f"{value} is not a finite number; give {accepted}"
         else:
             problem = f"{quote(value)} is not accepted; give {accepted}"
-        yield f"{place_of(steps)}: {problem}"
+        above = next((key for key in files if tuple(steps[: len(key)]) == key), ())
+        where = [place_of(above), files[above]] if above else []
+        where.append(place_of(steps[len(above) :]))
+        yield ": ".join([*filter(None, where), problem])
 
 
 def _accepted(known: Mapping[str, PlanKey], *keys: str) -> str:

@@ -33,6 +33,11 @@ class PathGain:
     exponent: float = 2.0
     elevation_db: tuple[float, ...] = ()
 
+    @property
+    def square(self) -> bool:
+        """Whether this is the paper's rho_0 d^-2."""
+        return self.exponent == 2.0 and not any(self.elevation_db)
+
     def gain(self, squared_distance: Real, height: float) -> Real:
         """Return the linear gain at d² (...), m², the one antenna `height` m above the other."""
         beyond = self._beyond_square_law(squared_distance, height)

@@ -10,10 +10,14 @@ from hypothesis import strategies as st
 from random_flights import random_flight
 
 from faao_mav.arrays import Real
+from faao_mav.optimizer.design import design
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.axis_bound import axis_bound
 from faao_mav.optimizer.search.best_rates import best_rates
-from faao_mav.optimizer.search.bound import upper_bound
+from faao_mav.optimizer.search.bound import radial_rates, upper_bound
+from faao_mav.optimizer.search.map_bound import map_bound
 from faao_mav.plan import read_plan
 
 FAINT = {
@@ -48,6 +52,32 @@ def bounds(small_plan: MakePlan) -> dict[str, tuple[Problem, float]]:
     plans = (small_plan(FAINT | {"radio.line_of_sight": kind}) for kind in kinds)
     problems = [build_problem(plan) for plan in plans]
     return {k: (each, upper_bound(each).value) for k, each in zip(kinds, problems, strict=True)}
+
+
+LAWS: tuple[dict[str, Any], ...] = (
+    {"exponent": 3.2},
+    {"elevation_db": [18, -30, 10]},
+    {"elevation_db": [0, 0, -40]},  # least overhead
+    {"exponent": 2.4, "elevation_db": [-8, 12]},
+    {"elevation_db": [40, -90, 45]},
+)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_no_flight_is_above_the_bounds_under_another_law(
+    small_plan: MakePlan, law: dict[str, Any]
+) -> None:
+    """Of 2,000 random flights for each law, and the best that is known."""
+    faint = {"radio.base_station.power_dbm": 5, "radio.fading": "none", "radio.gain": law}
+    plan = small_plan(faint | {"radio.ground_user.gain": {"exponent": 2.2}})
+    problem, best = build_problem(plan), optimize(plan)
+    flights = [random_flight(problem.kinematics, seed).w.T for seed in range(2000)]
+    w = np.stack([*flights, best.w.T], axis=1)
+    most = rate_field(problem, design(plan)).value(w).mean(axis=-1).min(axis=0).max()
+    assert most == pytest.approx(best.rates.R_avg, abs=1e-4)
+    rates, _ = radial_rates(problem)
+    found = map_bound(problem, rates, cells=1500), axis_bound(problem, rates)
+    assert most <= min(found) <= 1.25 * most
 
 
 @pytest.mark.usefixtures("coarse_map")

@@ -101,6 +101,28 @@ def test_rates_by_differences(small_plan: MakePlan) -> None:
     assert hessian == pytest.approx(hessian_by_differences(at, w), rel=1e-2, abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("fading", "precoder"), [("ergodic", "faao"), ("realization", "faao"), ("none", "mmse")]
+)
+def test_another_law_of_the_gain(small_plan: MakePlan, fading: str, precoder: str) -> None:
+    """Tables cover gains that do not fall with the distance, and slopes are the law's."""
+    law = {"exponent": 2.6, "elevation_db": [20, -60, 20]}
+    changes = {"radio.fading": fading, "optimizer.precoder": precoder, "radio.fading_samples": 4}
+    plan = small_plan(changes | {"radio.gain": law, "radio.ground_user.gain": {"exponent": 2.2}})
+    wanted, problem = design(plan), build_problem(plan)
+    assert [link.law.exponent for link in problem.links] == [2.6, 2.2]
+    for link in problem.links:
+        rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
+
+        def value(at: Real, rate: RateModel = rate, link: Link = link) -> Real:
+            return rate.value(*coordinates(link, at))
+
+        assert value(w) == pytest.approx(exactly(link, wanted, w), abs=2e-4)
+        gradient, hessian = derivatives(link, rate, w)
+        assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
+        assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+
+
 def exactly(link: Link, wanted: Design, w: Real) -> Real:
     H = link.channel(w, link.small_scale(w))
     return wanted.rate(link, H, wanted.precoders(link, H))

@@ -132,6 +132,11 @@ def _check_plan(problem: Problem) -> None:
             f"optimizer.rate: {plan.optimizer.rate}",
             "its sums are those of the cutoff rate",
         ),
+        (
+            any(not link.law.square for link in problem.links),
+            "radio.gain",
+            "its Proposition 1 is of a gain that falls by the square of the distance",
+        ),
     ):
         if refused:
             raise PlanError(

@@ -61,7 +61,9 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
         if accelerating and not half:
             tell(1, "the bound by the axis", value)
             value = min(value, axis_bound(problem, rates))
-        if not accelerating or half or problem.free_area is not None:
+        # the axis takes the most of all larger distances: with a gain that rises there, too much
+        other = any(not link.law.square for link in problem.links)
+        if not accelerating or half or problem.free_area is not None or other:
             tell(1, "the bound over the map", value)
             value = min(value, map_bound(problem, rates))
         value = max(known, value)
@@ -86,7 +88,6 @@ def radial_rates(problem: Problem) -> tuple[RadialRates, bool]:
         )
         # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being
         # known on the grid only.
-        between = np.abs(np.diff(best, 2, axis=1)).max(axis=1, keepdims=True) / 4
-        values.append(np.maximum.accumulate((best + between)[:, ::-1], axis=1)[:, ::-1])
+        values.append(best + np.abs(np.diff(best, 2, axis=1)).max(axis=1, keepdims=True) / 4)
         exact &= is_exact
     return RadialRates(float(r[1]), np.stack(values)), exact

@@ -9,6 +9,7 @@ duplex a slot has the larger of the two terms. The best flight at a price, by po
 sweep over the `Cells` of a map: whatever the price, its value is above every flight.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,15 +43,19 @@ _GOLDEN, _SECTIONS = (5**0.5 - 1) / 2, 9
 class RadialRates:
     """Upper bounds on the best rates of both links by the horizontal distance from the station.
 
-    `values` (2, slots or 1, m) at distances of 0, `step`, 2 `step` ..., bits, falling.
+    `values` (2, slots or 1, m) at distances of 0, `step`, 2 `step` ..., bits.
     """
 
     step: float
     values: Real
 
-    def at(self, link: int, slot: int, distance: Real) -> Real:
-        """Return the rate of `link` in `slot` at `distance` (...), m, or any larger one."""
+    def at(self, link: int, slot: int, distance: Real, beyond: float = math.inf) -> Real:
+        """Return the most of `link` in `slot` from `distance` (...), m, to so much `beyond` it."""
+        from scipy.ndimage import maximum_filter1d  # with the bounds, not before
+
         row = self.values[link, slot if self.values.shape[1] > 1 else 0]
+        size = 2 + math.ceil(min(beyond / self.step, len(row)))
+        row = maximum_filter1d(row, size, origin=-(size // 2), mode="nearest")
         grid = self.step * np.arange(len(row))
         return np.asarray(np.interp(distance.ravel(), grid, row).reshape(distance.shape))
 
@@ -60,7 +65,7 @@ def at_ends(problem: Problem, rates: RadialRates, price: float) -> float:
     kin, links = problem.kinematics, problem.links
     (U_0, U_1), (G_0, G_1) = (
         [
-            float(rates.at(j, slot, np.array([np.hypot(*(end - link.station))]))[0])
+            float(rates.at(j, slot, np.array([np.hypot(*(end - link.station))]), 0.0)[0])
             for slot, end in ((0, kin.start), (-1, kin.end))
         ]
         for j, link in enumerate(links)
@@ -133,7 +138,7 @@ class MapBound:
                 for i, v in enumerate(velocities):
                     place = (link.station - v * tau)[:, None, None]
                     away = np.maximum(0.0, np.hypot(*(cells.x - place)) - off)
-                    found[j, number % parts, i] += self.rates.at(j, slot, away)
+                    found[j, number % parts, i] += self.rates.at(j, slot, away, 2 * off)
         return found
 
     @property
