@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.schedule.lagged import LaggedRetimed
-from faao_mav.schedule.retimed import Retimed
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
@@ -111,8 +109,3 @@ class PlaneScheduler(Scheduler):
             tried.append(self.fitted(kept, self.max_speed))
         best = min(tried, key=lambda each: each.cost)
         return self.rounded(self.shared(best, self.max_speed), self.max_speed)
-
-    def retimed(self, schedule: Schedule) -> Retimed:
-        """Return what `schedule` becomes at other commands, which take effect with a lag."""
-        ratio = self.model.true_over_commanded(self.altitude)
-        return LaggedRetimed(schedule, ratio, self.wind)

@@ -9,7 +9,6 @@ autopilots (``model.LegDurations``); of others the flight tells.
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,25 +50,26 @@ class Retiming:
     late: float
 
 
-class Retimed(ABC):
-    """The flight of `schedule` as it would be at other commands.
+class Retimed:
+    """The flight of `schedule` as it would be at other commands, leg by leg.
 
     At the speeds v'_k and the waits h'_k it is at the same places later by
 
-        D(t, v') + sum_k (h'_k - h_k) [t > departure k],
+        D(t, v') + sum_k (h'_k - h_k) [t > departure k],  D = sum_k d_k(t) T_k(v').
 
-    D (k,) being what a subclass says. A command that is not reached, as on a short leg, counts as
-    the greatest speed of the leg: `limits` (m - 1,), m/s, infinite where it is reached.
+    T_k is by how much longer leg k takes, d_k(t), from 0 to 1, the share of it that has come up by
+    t: it grows while the leg is flown at its command. What is `known` of the vehicle tells T_k;
+    without that it is c_k (v_k / v'_k - 1), c_k being how long the leg is flown at its command. A
+    command that is not reached, as on a short leg, counts as the greatest speed of the leg:
+    `limits` (m - 1,), m/s, infinite where it is reached.
     """
 
-    limits: Real
-
-    def __init__(self, schedule: Schedule) -> None:
+    def __init__(self, schedule: Schedule, known: LegDurations | None = None) -> None:
         route, flown = schedule.route, schedule.flown
-        self._waits, self._lead = route.waits, route.lead
+        self._waits, self._lead, self._known = route.waits, route.lead, known
         self._t, self._places = flown.t[::_STRIDE], flown.position[::_STRIDE, :2]
         self._steps = np.diff(self._places, axis=0)
-        self._leg = np.searchsorted(flown.departures[1:-1], self._t, side="right")
+        leg = np.searchsorted(flown.departures[1:-1], self._t, side="right")
         self._left = (self._t[:, None] > flown.departures).astype(float)
         # the samples at which the clocks of plan and flight meet, and with which the flight is over
         self._start, self._late = schedule.start, schedule.late
@@ -77,17 +77,28 @@ class Retimed(ABC):
         found = np.searchsorted(self._t, [schedule.met, over])
         self._met, self._over = np.minimum(found, len(self._t) - 1).tolist()
 
-    @abstractmethod
-    def _later(self, speeds: Real) -> Real:
-        """Return D, by how much later each sample is at other `speeds` (m - 1,), (k,), s."""
-
-    @abstractmethod
-    def _later_slopes(self, speeds: Real) -> Real:
-        """Return what each of the `speeds` (m - 1,) does to D, (k, m - 1), s for 1 m/s."""
+        speed = lengths(flown.velocity[::_STRIDE])
+        under_way = (self._t >= flown.departures[leg]) & (self._t < flown.arrivals[leg + 1])
+        peaks = np.full(len(route.speeds), _LEAST_PEAK)
+        np.maximum.at(peaks, leg, speed * under_way)
+        tops = route.speeds if known is None else known.flown(route.speeds)[0]
+        self._peaks = np.where(tops > _REACHED * peaks, peaks, np.inf)
+        self.limits = self._peaks if known is None else np.minimum(self._peaks, known.most)
+        self._speeds = np.minimum(tops, self._peaks)
+        share = (speed / self._speeds[leg] - _HEEDING) / (_COMMANDED - _HEEDING)
+        lasting = np.diff(self._t) * under_way[:-1]
+        steps = np.zeros((len(self._t), len(peaks)))
+        at = np.arange(1, len(leg)), leg[:-1]
+        steps[at] = np.clip(share[:-1], 0.0, 1.0) * lasting
+        self._cruise = steps.sum(axis=0)
+        steps[at] += _RESTLESS * lasting
+        done = np.cumsum(steps, axis=0)
+        self._done = done / np.maximum(done[-1], 1e-9)
+        self._told = self._durations(route.speeds)
 
     def at(self, t: Real, route: Route) -> Retiming:
         """Return the flight with the commands of `route` at the plan's times `t` (n,), s."""
-        delays = self._later(route.speeds) + self._left @ (route.waits - self._waits)
+        delays = self._done @ self._longer(route.speeds) + self._left @ (route.waits - self._waits)
         ahead = route.lead - self._lead
         clock = np.maximum.accumulate(self._t + delays) - (
             self._start + float(delays[self._met]) + ahead
@@ -121,44 +132,8 @@ class Retimed(ABC):
             ]
         )
 
-
-class LegRetimed(Retimed):
-    """The flight of an aircraft that heeds a command at once, leg by leg.
-
-    D = sum_k d_k(t) T_k(v'), T_k being by how much longer leg k takes, and d_k(t), from 0 to 1, the
-    share of it that has come up by t: it grows while the leg is flown at its command. What is
-    `known` of the vehicle tells T_k; without that it is c_k (v_k / v'_k - 1), c_k being how long
-    the leg is flown at its command.
-    """
-
-    def __init__(self, schedule: Schedule, known: LegDurations | None = None) -> None:
-        super().__init__(schedule)
-        route, flown, leg = schedule.route, schedule.flown, self._leg
-        self._known = known
-        speed = lengths(flown.velocity[::_STRIDE])
-        under_way = (self._t >= flown.departures[leg]) & (self._t < flown.arrivals[leg + 1])
-        peaks = np.full(len(route.speeds), _LEAST_PEAK)
-        np.maximum.at(peaks, leg, speed * under_way)
-        tops = route.speeds if known is None else known.flown(route.speeds)[0]
-        self._peaks = np.where(tops > _REACHED * peaks, peaks, np.inf)
-        self.limits = self._peaks if known is None else np.minimum(self._peaks, known.most)
-        self._speeds = np.minimum(tops, self._peaks)
-        share = (speed / self._speeds[leg] - _HEEDING) / (_COMMANDED - _HEEDING)
-        lasting = np.diff(self._t) * under_way[:-1]
-        steps = np.zeros((len(self._t), len(peaks)))
-        at = np.arange(1, len(leg)), leg[:-1]
-        steps[at] = np.clip(share[:-1], 0.0, 1.0) * lasting
-        self._cruise = steps.sum(axis=0)
-        steps[at] += _RESTLESS * lasting
-        done = np.cumsum(steps, axis=0)
-        self._done = done / np.maximum(done[-1], 1e-9)
-        self._told = self._durations(route.speeds)
-
-    def _later(self, speeds: Real) -> Real:
-        later: Real = self._done @ self._longer(speeds)
-        return later
-
     def _later_slopes(self, speeds: Real) -> Real:
+        """Return what each of the `speeds` (m - 1,) does to D, (k, m - 1), s for 1 m/s."""
         legs = np.arange(len(speeds))
         moves = legs % _NEAR == np.arange(_NEAR)[:, None]
         down, up = (_NUDGE, 0.0) if self._known is None else (_MOVE, _MOVE)

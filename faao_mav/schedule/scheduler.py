@@ -12,7 +12,7 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.autopilot import Model, Vehicle
 from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
-from faao_mav.schedule.retimed import LegRetimed, Retimed
+from faao_mav.schedule.retimed import Retimed
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
@@ -98,14 +98,14 @@ class Scheduler(ABC):
             min_speed=self.min_speed,
             max_speed=top_speed,
             flights=flights,
-            retime=self.retimed,
+            retime=self._retimed,
             begun=begun,
         )
 
-    def retimed(self, schedule: Schedule) -> Retimed:
+    def _retimed(self, schedule: Schedule) -> Retimed:
         """Return what `schedule` becomes at other commands."""
         route = schedule.route
-        return LegRetimed(schedule, self.model.leg_durations(route.leg_lengths, route.joined))
+        return Retimed(schedule, self.model.leg_durations(route.leg_lengths, route.joined))
 
     def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
         """Return the route with the waypoints `points` (k,) moved against the flight's offset.

@@ -16,7 +16,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.errors import InputError
-from faao_mav.schedule.retimed import LegRetimed, Retimed, Retiming
+from faao_mav.schedule.retimed import Retimed, Retiming
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import LATE_WEIGHT, Schedule
 
@@ -43,7 +43,7 @@ def fit(
     min_speed: float,
     max_speed: float,
     flights: int = MOST_FLIGHTS,
-    retime: Callable[[Schedule], Retimed] = LegRetimed,
+    retime: Callable[[Schedule], Retimed] = Retimed,
     begun: Schedule | None = None,
 ) -> Schedule:
     """Return the `flight` of `route` with the speeds, the waits and the lead that fit best.
