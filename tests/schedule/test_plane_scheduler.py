@@ -6,7 +6,7 @@ from relay_flights import Trajectory, converted, plan_with
 
 from faao_mav.autopilot import Track
 from faao_mav.autopilot.ardupilot.plane import ArduPlane
-from faao_mav.autopilot.atmosphere import density_ratio
+from faao_mav.autopilot.body import density_ratio
 from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame

@@ -3,19 +3,21 @@
 from faao_mav.autopilot.ardupilot import (
     ARDUPILOT,
     HOME_OUTSIDE_FENCE,
+    SHARED,
     at_fence,
     needs_one_inclusion,
+    rally_parameters,
     rally_rule,
+    switch,
 )
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPlane
-from faao_mav.autopilot.ardupilot.plane.parameters import TABLE
 from faao_mav.autopilot.body import ARDUPLANE_BODY
 from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
-from faao_mav.autopilot.parameter import ParameterValues
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
 from faao_mav.autopilot.vehicle_type import VehicleType
 
 _LOITER, _RTL = 12, 11
@@ -40,6 +42,21 @@ def _vertical(vehicle: ParameterValues) -> VerticalProfile:
     )
 
 
+_TABLE = table(
+    *ArduPlane.parameters(),
+    Parameter("loiter_radius", "m", 60.0, {"WP_LOITER_RAD": 1.0}, 1.0, either_sign=True),
+    Parameter(
+        "return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0, motion=False
+    ),
+    *SHARED,
+    switch("fence_options", 1, "FENCE_OPTIONS"),
+    switch("fence_type", 4, "FENCE_TYPE"),
+    switch("return_lands", 0, "RTL_AUTOLAND"),
+    *rally_parameters(limit=5000.0, home=0),
+)
+"""ArduPlane's parameters. A negative `loiter_radius` turns left; a `return_height` below 0 keeps
+the height at which the return begins."""
+
 ARDUPLANE = VehicleType(
     family=ARDUPILOT,
     kind="plane",
@@ -47,7 +64,7 @@ ARDUPLANE = VehicleType(
     mav_types=(1,),
     modes=_MODES,
     hovers=False,
-    parameters=TABLE,
+    parameters=_TABLE,
     dialect=PLANE_DIALECT,
     vertical=_vertical,
     fence_needs_one_inclusion=needs_one_inclusion,
