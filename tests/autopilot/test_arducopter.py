@@ -240,17 +240,6 @@ def test_splines_pass_their_points(path: FlightPath, model: ArduCopter) -> None:
         assert np.linalg.norm(flown.position - point, axis=1).min() < 3.0
 
 
-@given(st.floats(0.1, 20), st.floats(0.5, 5), st.floats(0.5, 2))
-def test_an_error_counts_as_far_as_it_asks_for_the_commanded_speed(
-    speed: float, acceleration: float, gain: float
-) -> None:
-    error = ArduCopter(acceleration=acceleration, position_gain=gain).farthest(speed)
-    asked = gain * error
-    if asked > acceleration / gain:
-        asked = math.sqrt(2 * acceleration * (error - acceleration / (2 * gain**2)))
-    assert asked == pytest.approx(speed)
-
-
 def test_limits_come_from_parameters_of_either_generation() -> None:
     older = {"WPNAV_ACCEL": 400, "WPNAV_JERK": 10, "WPNAV_SPEED_UP": 300, "WPNAV_SPEED": 700}
     newer = {"WP_ACC": 4, "WP_JERK": 10, "WP_SPD_UP": 3, "WP_SPD": 7}

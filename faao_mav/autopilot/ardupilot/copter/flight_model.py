@@ -77,7 +77,7 @@ class ArduCopter(ArduCopterLimits):
         stopping[[0, -1]] = True
         scale = np.array([self.east_metre, self.north_metre, 1.0])
         target = Target(path.points * scale, path.speeds, path.splines, stopping, self)
-        clock = _Clock(self, target.passed, waits, stopping)
+        clock = _Clock(self, target.passed[stopping], waits[stopping])
         samples = Samples(path.longest)
         shown = self._follow(target.motion, clock, path, samples)
         arrivals = np.interp(target.passed, shown, STEP * np.arange(len(shown)))
@@ -94,11 +94,8 @@ class ArduCopter(ArduCopterLimits):
         """
         place = motion[:, ::3] + 1j * motion[:, 1::3]
         rows = list(zip(*place.T.tolist(), *motion[:, 2:6:3].T.tolist(), strict=True))
-        passed = [*clock.passed[1:], math.inf]
-        speeds = np.append(path.speeds, path.speeds[-1:]).tolist() or [self.cruise_speed]
         body = Copter(self.body, rows[0][0], complex(*path.wind))
-        controller, leg, farthest = _Controller(self, body.lean), -1, math.inf
-        shown: list[float] = []
+        controller, shown = _Controller(self, body.lean), list[float]()
         while True:
             k = min(int(clock.time / STEP), len(rows) - 2)
             share = clock.time / STEP - k
@@ -110,13 +107,7 @@ class ArduCopter(ArduCopterLimits):
             shown.append(clock.time)
             if not clock.runs(now):
                 return shown
-            if now < clock.resume:  # at rest, though samples on both sides are not
-                velocity, push, climb = 0j, 0j, 0.0
-            while leg < 0 or clock.time >= passed[leg]:
-                leg += 1
-                farthest = self.farthest(speeds[leg])
             error = place - body.place
-            error *= farthest / max(farthest, abs(error))
             clock.adapt(controller.pace(error, velocity, climb, body.velocity))
             if abs(velocity) > _HEADED:
                 body.nose = velocity / abs(velocity)
@@ -128,17 +119,15 @@ class _Clock:
     """The target's clock, which slows down for an aircraft behind and stands at stops.
 
     Its `time`, s, goes on at the `rate`, which follows what is asked for with the time constant
-    A/J; at stops it goes on when the flight has taken `resume` s. `passed` are the times at which
-    points count as reached, `arrivals`, s of the flight, are those at the stops so far.
+    A/J; at stops it goes on when the flight has taken `resume` s. `arrivals`, s of the flight, are
+    when it came to the stops so far.
     """
 
-    def __init__(
-        self, limits: ArduCopterLimits, passed: Real, waits: Real, stopping: Flags
-    ) -> None:
+    def __init__(self, limits: ArduCopterLimits, stops: Real, waits: Real) -> None:
         self.time, self.rate, self.resume = 0.0, 1.0, float(waits[0])
-        self.passed, self.arrivals = passed.tolist(), [0.0]
+        self.arrivals = [0.0]
         self._adapting = -math.expm1(-STEP * limits.jerk / limits.acceleration)
-        self._stops = list(zip(passed[stopping].tolist(), waits[stopping].tolist(), strict=True))
+        self._stops = list(zip(stops.tolist(), waits.tolist(), strict=True))
 
     def runs(self, now: float) -> bool:
         """Tell whether the flight, `now` s old, is not over."""

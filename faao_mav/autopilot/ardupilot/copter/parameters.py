@@ -88,17 +88,6 @@ class ArduCopterLimits(Model):
             2 * max(self.input_time, _LEAST_INPUT_TIME), math.pi * self.jerk / (GRAVITY * agility)
         )
 
-    def farthest(self, speed: float) -> float:
-        """Return the error, m, at which the position controller asks for a correction at `speed`.
-
-        With the gain k and the acceleration A that is v / k, from v = A / k on v²/2A + A/2k²: of an
-        error farther than that of the commanded speed no more is made.
-        """
-        gain, most = self.position_gain, self.acceleration
-        if speed <= most / gain:
-            return speed / gain
-        return speed**2 / (2 * most) + most / (2 * gain**2)
-
     @property
     def corner(self) -> float:
         """The greatest acceleration in a corner, m/s²."""

@@ -51,8 +51,9 @@ class ArduPlane(Model):
     limit, airspeed and height by total energy control. A waypoint is reached within its acceptance
     radius or on passing the perpendicular through it. Where the waypoint gives no radius it is the
     least of WP_RADIUS, over the density's ratio, and the guidance's look-ahead, for turns below 90
-    degrees in proportion to the turn. Commanded speeds are equivalent airspeeds. ArduPlane has no hold at a plain waypoint,
-    so `FlightPath.holds` do not count. `descent_speed` is the sink rate with an idling engine.
+    degrees in proportion to the turn. Commanded speeds are equivalent airspeeds. ArduPlane has no
+    hold at a plain waypoint, so `FlightPath.holds` do not count. `descent_speed` is the sink rate
+    with an idling engine.
     """
 
     cruise_speed: float = parameter(
