@@ -66,18 +66,13 @@ class Curve:
         quadratic, cubic = 3 * step - 2 * leaving - arriving, leaving + arriving - 2 * step
         x = np.linspace(0.0, 1.0, 1 + int(np.clip(np.ceil(chord / _SPACING), 16, 200)))[:, None]
         self.points = points[k] + x * (leaving + x * (quadratic + x * cubic))
-        # the derivatives vanish at an end at rest: the direction is that of the next order there
-        inside = np.clip(x, 1e-6, 1 - 1e-6)
-        first = leaving + inside * (2 * quadratic + 3 * inside * cubic)
-        second = 2 * quadratic + 6 * inside * cubic
-        rate = np.linalg.norm(first, axis=1)[:, None]
-        cusp = rate < 1e-9 * chord
-        first, rate = np.where(cusp, step, first), np.where(cusp, chord, rate)
-        self.tangents = first / rate
-        across = second - self.tangents * np.sum(second * self.tangents, axis=1)[:, None]
-        bend = np.maximum(np.linalg.norm(across / rate**2, axis=1), 1e-12)
+        ways = np.gradient(self.points, axis=0)
+        spacing = np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
+        self.tangents = ways / spacing
+        bends = np.gradient(self.tangents, axis=0) / spacing
+        bend = np.maximum(np.linalg.norm(bends, axis=1), 1e-12)
         own = limits.acceleration, limits.climb_acceleration
-        bent = within(across / rate**2 / bend[:, None], *own) / 2
+        bent = within(bends / bend[:, None], *own) / 2
         self.allowed = np.minimum(speed_along(self.tangents, speed, limits), np.sqrt(bent / bend))
         self._slope = within(self.tangents, *own) / 2
         self.times = self.speeds = np.zeros(len(x))
