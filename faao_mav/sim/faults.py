@@ -2,7 +2,8 @@
 
 import heapq
 import time
-from dataclasses import dataclass, field
+from collections import Counter
+from dataclasses import dataclass
 from itertools import count
 from random import Random
 from typing import NamedTuple
@@ -40,23 +41,19 @@ class Faults:
     seed: int = 0
 
 
-@dataclass(slots=True)
 class Channel:
     """One direction of a link; `name` sets its randomness apart from that of others."""
 
-    faults: Faults
-    name: str
-    _random: Random = field(init=False)
-    _seen: dict[int, int] = field(init=False, default_factory=dict)
-    _free: float = field(init=False, default=0.0)
-
-    def __post_init__(self) -> None:
-        self._random = Random(f"{self.faults.seed} {self.name}")
+    def __init__(self, faults: Faults, name: str) -> None:
+        self._faults, self._random = faults, Random(f"{faults.seed} {name}")
+        self._seen, self._free = Counter[int](), 0.0
 
     def carry(self, packet: bytes, now: float) -> list[tuple[float, bytes]]:
         """Return when `packet`, sent at `now`, arrives, and as what; not at all, once or twice."""
-        faults, random = self.faults, self._random
-        if self._is_lost(packet) or any(begin <= now < end for begin, end in faults.outages):
+        faults, random, number = self._faults, self._random, message_id(packet)
+        self._seen[number] += 1
+        lost = Lost(number, self._seen[number]) in faults.lost
+        if lost or any(begin <= now < end for begin, end in faults.outages):
             return []
         if faults.rate:
             now = self._free = max(self._free, now) + len(packet) / faults.rate
@@ -72,13 +69,6 @@ class Channel:
             arrivals.append((arrival, bytes(content)))
         return arrivals
 
-    def _is_lost(self, packet: bytes) -> bool:
-        if not self.faults.lost:
-            return False
-        number = message_id(packet)
-        self._seen[number] = self._seen.get(number, 0) + 1
-        return Lost(number, self._seen[number]) in self.faults.lost
-
 
 class FaultyTransport:
     """A transport that loses, repeats, delays and damages what passes it, both ways."""
@@ -93,18 +83,18 @@ class FaultyTransport:
 
     def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         """Return what has arrived by now, or within `timeout` seconds."""
-        end = self._pass() + timeout
-        end = min([end, *(each[0] for each in self._under_way[:1])])
+        self._pass(self._now())
+        end = min([self._now() + timeout, *(each[0] for each in self._under_way[:1])])
         for data, origin in self._inner.read(0.0 if self._arrived else end - self._now()):
             self._push(self._in, data, origin)
-        self._pass()
+        self._pass(self._now())
         arrived, self._arrived = self._arrived, []
         return arrived
 
     def write(self, data: bytes, to: Origin | None = None) -> None:
         """Send `data` as the faults allow: late, damaged, twice or not at all."""
         self._push(self._out, data, to)
-        self._pass()
+        self._pass(self._now())
 
     def close(self) -> None:
         """Close the transport beneath; what was sent is under way, and arrives early."""
@@ -121,13 +111,11 @@ class FaultyTransport:
             item = (when, next(self._order), channel is self._out, arriving, where)
             heapq.heappush(self._under_way, item)
 
-    def _pass(self, now: float | None = None) -> float:
-        """Hand over what arrives by `now`, and return when that is."""
-        now = self._now() if now is None else now
+    def _pass(self, now: float) -> None:
+        """Hand over what arrives by `now`."""
         while self._under_way and self._under_way[0][0] <= now:
             _, _, goes_out, data, where = heapq.heappop(self._under_way)
             if goes_out:
                 self._inner.write(data, where)
             else:
                 self._arrived.append((data, where or ""))
-        return now

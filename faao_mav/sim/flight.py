@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Real
+from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle, VehicleType
 from faao_mav.autopilot.manners import FenceAction
 from faao_mav.autopilot.predict import predict
@@ -24,7 +24,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.sim.follower import EARLY, Follower
+from faao_mav.sim.follower import Follower
 from faao_mav.wire.messages import SetPositionTargetLocalNed
 
 Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
@@ -71,6 +71,7 @@ class Flight:
         """Stand at home with the motors off, and know of no setpoints."""
         self._first_heard = self._last_heard = -math.inf
         self._begun = self._since = 0.0
+        self._outside = False
         self.aircraft.stand()
         self.land()
 
@@ -135,8 +136,8 @@ class Flight:
                 self._track = self._fly(mission, vehicle)
             except InputError:
                 return False
-            self._pending = _reached(self._track, mission)
-            self._leaves = _leaves(self._track, mission.fence, vehicle)
+            self._pending, self._fence = _reached(self._track, mission), mission.fence
+            self._outside = self.is_outside(self._fence, self.aircraft.at(now).position)
             self._since = self._pending[0][0] if flies and self._pending else 0.0
         track, here = self._track, self.aircraft.at(now).position
         k = min(int(np.searchsorted(track.t, self._since)), len(track.t) - 1)
@@ -148,36 +149,35 @@ class Flight:
         self._follows, self.on_mission = False, True
         return True
 
-    @property
-    def next_event(self) -> float:
-        """When the next item is reached, the fence is left, or it comes to the end of its way."""
-        events = [self._leaves, *(time for time, _ in self._pending[:1])] if self.on_mission else []
-        return min([self._begun + time for time in events] + [self.aircraft.arrives])
-
     def reached(self, now: float) -> list[int]:
         """Return the items of the mission that were reached since the last call."""
         if not self.on_mission:
             return []
-        due = [number for time, number in self._pending if self._begun + time <= now + EARLY]
+        due = [number for time, number in self._pending if self._begun + time <= now]
         self._pending = self._pending[len(due) :]
         return due
 
     def leaves_fence(self, now: float) -> bool:
         """Do what is to be done where a mission leaves the fence; tell that, once."""
-        if not self.on_mission or self._begun + self._leaves > now + EARLY:
+        was_outside = self._outside
+        if self.on_mission:
+            self._outside = self.is_outside(self._fence, self.aircraft.at(now).position)
+        if was_outside or not self._outside:
             return False
-        self._leaves = math.inf
         action = self._type.at_fence(self.vehicle).action
         if action != "report":
             self.mode = self.asked_mode = self.modes.at_fence.get(action, self.mode)
             self._do(action, now)
         return True
 
-    def home_outside(self, fence: Fence) -> bool:
-        """Tell whether home lies outside a `fence` that it does something about."""
+    def is_outside(self, fence: Fence, place: Real) -> bool:
+        """Tell whether `place`, m from home, is outside a `fence` that it does something about."""
         vehicle = self.vehicle
-        acts = fence and self._type.at_fence(vehicle).action != "nothing"
-        return bool(acts) and not _covered(fence, self._frame, vehicle, np.zeros((1, 2))).all()
+        if not fence or self._type.at_fence(vehicle).action == "nothing":
+            return False
+        any_inclusion = self._type.fence_needs_one_inclusion(vehicle)
+        area = FreeArea.of(areas_of(fence, self._frame), any_inclusion=any_inclusion)
+        return not area.covers(place[None, :2]).all()
 
     # ---- setpoints
 
@@ -245,21 +245,3 @@ def _reached(track: Track, mission: Mission) -> list[tuple[float, int]]:
     do = [item.command >= _FIRST_DO for item in mission.items[1:]] + [False]
     done = enumerate(track.reached[: len(do)])
     return sorted((float(t), index + do[index]) for index, t in done if math.isfinite(t))
-
-
-def _leaves(track: Track, fence: Fence, vehicle: Vehicle) -> float:
-    """Return when `track` leaves `fence`, s, inf if never or if `vehicle` does not care.
-
-    A flight that starts outside leaves the fence once it has been inside.
-    """
-    if not fence or vehicle.type.at_fence(vehicle).action == "nothing":
-        return math.inf
-    out = ~_covered(fence, track.frame, vehicle, track.position[:, :2])
-    left = np.flatnonzero(out & np.logical_or.accumulate(~out))
-    return float(track.t[left[0]]) if len(left) else math.inf
-
-
-def _covered(fence: Fence, frame: LocalFrame, vehicle: Vehicle, places: Real) -> Flags:
-    """Return at which `places` (n, 2), m in `frame`, `vehicle` is inside `fence`, (n,)."""
-    any_inclusion = vehicle.type.fence_needs_one_inclusion(vehicle)
-    return FreeArea.of(areas_of(fence, frame), any_inclusion=any_inclusion).covers(places)

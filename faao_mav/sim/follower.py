@@ -21,9 +21,6 @@ _PUSH = 5.0
 _GROUND = 0.5
 """Metres above home below which it stands on the ground; chosen."""
 
-EARLY = 1e-6
-"""Seconds by which an event may come early, rather than a tick late; chosen."""
-
 
 class Posture(NamedTuple):
     """Position, m, and velocity, m/s, (3,) east, north, up of home; and the mission's item."""
@@ -84,7 +81,7 @@ class Follower:
 
     def landed(self, now: float) -> bool:
         """Tell whether it has come to a last place that is on the ground."""
-        return now >= self.arrives - EARLY and not self.flies(now)
+        return now >= self.arrives and not self.flies(now)
 
     def at(self, now: float) -> Posture:
         """Return where it is, and how it moves."""

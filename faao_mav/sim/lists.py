@@ -1,5 +1,6 @@
 """How a mock autopilot takes, refuses, stores and gives lists of items."""
 
+import math
 import struct
 import zlib
 from collections.abc import Callable, Iterable
@@ -90,9 +91,9 @@ class Lists:
         return zlib.crc32(packed) if self._behaviour.numbers_lists else 0
 
     @property
-    def deadline(self) -> float | None:
-        """When the next request or the end of patience is due."""
-        return min(map(self._due, self._transfers.values()), default=None)
+    def deadline(self) -> float:
+        """When the next request or the end of patience is due; infinity for none."""
+        return min(map(self._due, self._transfers.values()), default=math.inf)
 
     def _due(self, transfer: _Transfer) -> float:
         end = transfer.heard + self._manners.patience

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
@@ -86,7 +88,7 @@ class MockAutopilot(Machine[None]):
         self._speedup, self._beat, self._boot, self._place = speedup, beat, boot, place
         self._battery, self._tells_asked_mode, self._current = battery, False, 0
         self._period = 1 / rate / speedup if rate > 0 else math.inf
-        self._booted = self._now = self._ticked = self._next_beat = self._next_report = 0.0
+        self._booted = self._now = self._next_beat = self._next_report = 0.0
         self._ready_at = boot
 
     @property
@@ -100,13 +102,10 @@ class MockAutopilot(Machine[None]):
         return self.flight.mode
 
     @property
-    def deadline(self) -> float | None:
+    def deadline(self) -> float:
         """When `tick` is due."""
-        event = self._booted + self.flight.next_event / self._speedup
-        due = [self._next_beat, self.lists.deadline or math.inf]
-        if self.armed and event > self._ticked:  # what a tick has seen is over
-            due.append(event)
-        return min(*due, self._next_report if self._period < math.inf else math.inf)
+        report = self._next_report if self._period < math.inf else math.inf
+        return min(self._next_beat, self.lists.deadline, report)
 
     def start(self, now: float) -> Sequence[Message]:
         """Boot."""
@@ -142,10 +141,10 @@ class MockAutopilot(Machine[None]):
     # ---- what it says by itself
 
     def _time_out(self, now: float) -> Sequence[Message]:
-        late = now - (self.deadline or now)
+        late = now - self.deadline
         if self._speedup > 1 and self.flight.on_mission and late > _LATE:
             self._booted += late
-        self._now = self._ticked = now
+        self._now = now
         out = self.lists.tick(now)
         if self.armed:
             out += self._follow(now)
@@ -342,7 +341,7 @@ class MockAutopilot(Machine[None]):
             fence = self.mission().fence
         except InputError:  # peers store what they like
             return None
-        outside = self.behaviour.armed_inside_only and self.flight.home_outside(fence)
+        outside = self.behaviour.armed_inside_only and self.flight.is_outside(fence, np.zeros(3))
         return "Vehicle breaching Polygon fence" if outside else None
 
     def _set_mode(self, mode: int, now: float) -> int:

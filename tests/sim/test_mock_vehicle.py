@@ -19,7 +19,6 @@ from faao_mav.wire.messages import (
     AutopilotVersion,
     CommandAck,
     CommandLong,
-    Envelope,
     GlobalPositionInt,
     Heartbeat,
     HomePosition,
@@ -247,17 +246,6 @@ def test_no_command_and_no_setpoint_brings_it_down(kind: MockKind) -> None:
             desk.tell(replace(STILL, **wrong))
             assert only(desk.wait(0.5), GlobalPositionInt)
     assert desk.machine.armed
-
-
-def test_where_it_has_come_to_it_is_due_for_its_reports_only() -> None:
-    mock, now = desk_for("ardupilot").machine, 0.0
-    for message in (SetMode(1, 1, 4), command(400, 1), command(22, *[0] * 6, 20.0)):
-        assert result(mock.on(Envelope(GROUND_STATION, message), now)) == 0
-    for _ in range(150):  # of the position four times a second, and heartbeats
-        now = mock.deadline
-        mock.tick(now)
-    assert now > 25.0
-    assert mock.posture(now).position[2] == pytest.approx(20.0)
 
 
 @BOTH
