@@ -279,7 +279,8 @@ class Session:
         note: Callable[[str], object] | None = None,
     ) -> None:
         self.started = time.monotonic()
-        self._observe, self._note, self._key_file = observe, note or warnings.warn, signing_key
+        self._observe, self._note = observe or (lambda *_: None), note or warnings.warn
+        self._key_file = signing_key
         self._signing = None if signing_key is None else read_signing(signing_key)
         own = Address(own_system or GROUND_STATION.system, GROUND_STATION.component)
         self.link = WireLink(
@@ -297,7 +298,7 @@ class Session:
         try:
             heard = self.run(search)
             for verdict, text in _PASSED_OVER.items():
-                if self._signing and not heard.vehicles and verdict in self.link.heard:
+                if self._signing and not heard.vehicles and verdict in self.link.codec.heard:
                     told = text.format(key=signing_key)
                     raise LinkError(f"{connection}: no vehicle: {told}")
             self.found = choose(heard, connection, system, component, wait)
@@ -324,7 +325,7 @@ class Session:
 
     def _check_alive(self, connection: str, timeouts: Timeouts) -> None:
         """Raise `LinkError` for a recording, and for a vehicle that does not read MAVLink 2."""
-        old = self.link.speaks_old(self.found.address)
+        old = self.found.address not in self.link.codec.modern
         if self._signing is None and not old:
             return
         asked = ask_alive(self.found.address, secrets.randbits(62), timeouts.silence)
@@ -353,7 +354,7 @@ class Session:
 
     def why_silent(self) -> str:
         """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
-        if self._signing is None and "signed" in self.link.heard:
+        if self._signing is None and "signed" in self.link.codec.heard:
             return "; it signs its packets, and may want them signed: --signing-key"
         family = self.found.family
         return f"; {family.only_one_station}" if family and family.only_one_station else ""

@@ -4,7 +4,7 @@ import os
 import secrets
 import struct
 import time
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from io import FileIO
 from pathlib import Path
 from typing import TypeAlias, TypeVar
@@ -22,7 +22,7 @@ from faao_mav.wire.protocol import (
     Address,
     MavState,
 )
-from faao_mav.wire.signing import Signing, Verdict
+from faao_mav.wire.signing import Signing
 from faao_mav.wire.transport import Origin, Transport, open_transport
 
 T = TypeVar("T")
@@ -106,7 +106,7 @@ class WireLink:
         note: Callable[[str], object] = lambda _: None,
     ) -> None:
         self.address, self._note = address, note
-        self._codec = Codec(address, signing)
+        self.codec = Codec(address, signing)
         self.log = None if log is None else Tlog(log)
         self._vehicle: tuple[Address, Origin] | None = None
         # A number in it tells it from that of another program with this address, if it comes back.
@@ -115,6 +115,8 @@ class WireLink:
         self.strangers: set[Origin] = set()
         """Where packets in the name of the vehicle come from that is bound elsewhere."""
         self._transport = open_transport(connection) if isinstance(connection, str) else connection
+        self.listens = self._transport.listens
+        """Whether anybody may send here: several vehicles, of one number perhaps."""
 
     def __enter__(self) -> "WireLink":
         return self
@@ -128,20 +130,6 @@ class WireLink:
         if self.log is not None:
             self.log.close()
 
-    @property
-    def listens(self) -> bool:
-        """Whether anybody may send here: several vehicles, of one number perhaps."""
-        return self._transport.listens
-
-    @property
-    def heard(self) -> Set[Verdict]:
-        """What signatures the packets of others had, as `Codec.heard`."""
-        return self._codec.heard
-
-    def speaks_old(self, sender: Address) -> bool:
-        """Tell whether all that was heard of `sender` is MAVLink 1."""
-        return sender not in self._codec.modern
-
     def bind(self, vehicle: Address, origin: Origin) -> None:
         """Talk to `vehicle` at `origin` alone from now on.
 
@@ -151,7 +139,7 @@ class WireLink:
         """
         self._vehicle = vehicle, origin
 
-    def run(self, machine: Machine[T], observe: Observe | None = None) -> T:
+    def run(self, machine: Machine[T], observe: Observe = lambda *_: None) -> T:
         """Run `machine` to its end and return the outcome.
 
         Interrupted from the keyboard it cancels the transfer first. Raises `LinkError`, which says
@@ -161,8 +149,7 @@ class WireLink:
             self.begin(machine)
             while (outcome := machine.outcome) is None:
                 self.step(machine, time.monotonic() + _BEAT)
-                if observe is not None:
-                    observe(*machine.progress)
+                observe(*machine.progress)
             return outcome
         except (KeyboardInterrupt, LinkError) as end:
             what, done, total = machine.progress
@@ -185,7 +172,7 @@ class WireLink:
             try:
                 if time.monotonic() >= next_beat:
                     next_beat = time.monotonic() + _BEAT
-                    self._send([self._being_there] if beats else [])
+                    self._send([self._being_there] * beats)
                 self.step(machine, next_beat)
                 try:
                     if heard:
@@ -208,7 +195,7 @@ class WireLink:
         due = machine.deadline
         until = until if due is None else min(due, until)
         for data, origin in self._transport.read(until - time.monotonic()):
-            for packet in self._codec.parse(data, origin):
+            for packet in self.codec.parse(data, origin):
                 if not self._counts(packet, origin):
                     continue
                 if self.log is not None:
@@ -238,7 +225,7 @@ class WireLink:
 
     def _send(self, messages: Sequence[Message], to: Origin | None = None) -> None:
         for message in messages:
-            packet = self._codec.pack(message)
+            packet = self.codec.pack(message)
             if self.log is not None:
                 self.log.write(packet, received=False)
             self._transport.write(packet, to if self._vehicle is None else self._vehicle[1])
