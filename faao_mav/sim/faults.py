@@ -2,21 +2,11 @@
 
 import heapq
 import time
-from collections import Counter
 from dataclasses import dataclass
 from itertools import count
 from random import Random
-from typing import NamedTuple
 
-from faao_mav.wire.framing import message_id
 from faao_mav.wire.transport import Origin, Transport
-
-
-class Lost(NamedTuple):
-    """One particular packet that does not arrive: the `number`-th (from 1) with `message_id`."""
-
-    message_id: int
-    number: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +16,7 @@ class Faults:
     `loss`, `duplication` and `corruption` are probabilities. Every packet takes `latency` seconds;
     with probability `reordering` it takes up to `delay` longer, so that later ones overtake it.
     A line of `rate` bytes per second (0: any) carries one packet after the other, lost ones too.
-    Nothing passes during `outages` (from, to; seconds). `lost` names packets one by one.
+    Nothing passes during `outages` (from, to; seconds).
     """
 
     loss: float = 0.0
@@ -37,7 +27,6 @@ class Faults:
     latency: float = 0.002
     rate: float = 0.0
     outages: tuple[tuple[float, float], ...] = ()
-    lost: tuple[Lost, ...] = ()
     seed: int = 0
 
 
@@ -46,14 +35,12 @@ class Channel:
 
     def __init__(self, faults: Faults, name: str) -> None:
         self._faults, self._random = faults, Random(f"{faults.seed} {name}")
-        self._seen, self._free = Counter[int](), 0.0
+        self._free = 0.0
 
     def carry(self, packet: bytes, now: float) -> list[tuple[float, bytes]]:
         """Return when `packet`, sent at `now`, arrives, and as what; not at all, once or twice."""
-        faults, random, number = self._faults, self._random, message_id(packet)
-        self._seen[number] += 1
-        lost = Lost(number, self._seen[number]) in faults.lost
-        if lost or any(begin <= now < end for begin, end in faults.outages):
+        faults, random = self._faults, self._random
+        if any(begin <= now < end for begin, end in faults.outages):
             return []
         if faults.rate:
             now = self._free = max(self._free, now) + len(packet) / faults.rate

@@ -1,6 +1,7 @@
 """Machines that talk over a bad link, on a clock that jumps from event to event."""
 
 import heapq
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import count
@@ -8,6 +9,7 @@ from typing import Any
 
 from faao_mav.sim.faults import Channel, Faults
 from faao_mav.wire.codec import Codec
+from faao_mav.wire.framing import message_id
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.protocol import Address
 
@@ -45,12 +47,14 @@ def simulate(
     others: Sequence[Station] = (),
     events: Sequence[tuple[float, Callable[[float], object]]] = (),
     heard: Callable[[Envelope, float], object] | None = None,
+    lost: tuple[int, int] | None = None,
 ) -> float:
     """Run until `client` has an outcome, or `until`, and return the time that it took, s.
 
     Everybody hears everybody, as behind a router, through `faults` that are drawn for each pair
     and direction. Packets are real ones: what is corrupted is rejected by its checksum, or is
     not. `events` are called at their times, with them; `heard` is told what the client receives.
+    Of the message with the first number in `lost` each channel loses one, counted from 1.
     """
     faults = faults or Faults()
     nodes = [_Node(station, Codec(station.address)) for station in (client, server, *others)]
@@ -59,13 +63,18 @@ def simulate(
             node.channels[receiver] = Channel(faults, f"{sender} to {receiver}")
     order = count()
     queue: list[tuple[float, int, int, bytes]] = []
+    passed = Counter[tuple[int, int, int]]()
     planned = sorted(events, key=lambda event: event[0])
 
     def send(sender: int, messages: Sequence[Message], now: float) -> None:
         for message in messages:
             packet = nodes[sender].codec.pack(message)
             for receiver in range(len(nodes)):
-                if receiver != sender:
+                if receiver == sender:
+                    continue
+                number = message_id(packet)
+                passed[sender, receiver, number] += 1
+                if (number, passed[sender, receiver, number]) != lost:
                     for time, arriving in nodes[sender].channels[receiver].carry(packet, now):
                         heapq.heappush(queue, (time, next(order), receiver, arriving))
 

@@ -170,7 +170,7 @@ class Course:
 
 
 def there_and_back(
-    kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0
+    kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0, **more: Any
 ) -> list[Course]:
     """Return the courses of an upload of `count` rows and of reading them back."""
     mock = MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry)
@@ -181,7 +181,7 @@ def there_and_back(
     for talk in (upload(rows, peer), download(peer)):
         client, server = Counted(Script(talk)), Counted(mock)
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
-        took = simulate(*stations, faults, until=2000.0)
+        took = simulate(*stations, faults, until=2000.0, **more)
         courses.append(Course(client.outcome.status, took, client.number(), server.number()))
         if client.outcome.items:
             assert client.outcome.items == mock.lists.items(MissionType.MISSION)
