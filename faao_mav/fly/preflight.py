@@ -3,6 +3,7 @@
 Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
@@ -16,7 +17,7 @@ from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.words import counted
-from faao_mav.wire.parameters import close, number_in
+from faao_mav.wire.parameters import number_in
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.whereabouts import (
     FIRST_AWAY,
@@ -180,7 +181,7 @@ def _timing(flight: Flight, held: Held, seen: Telemetry, judged: Check) -> Itera
             (unread if timed else assumed).append(" or ".join(parameter.names))
         elif timed:
             wanted = number_in(parameter, name, given)
-            if wanted is not None and not close(values[name], wanted):
+            if wanted is not None and not math.isclose(values[name], wanted, rel_tol=1e-6):
                 other.append(f"{name} is {values[name]:g}, not {wanted:g}")
     # Setpoints come when they are due, whatever the mission's time is.
     level = Level.WARNING if flight.streamed else None

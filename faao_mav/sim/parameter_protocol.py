@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.wire.messages import Message, ParamRequestList, ParamRequestRead, ParamSet, ParamValue
-from faao_mav.wire.parameters import Setting, on_the_wire, setting_in
+from faao_mav.wire.parameters import carried, value_in
 
 _INT32, _REAL32 = 6, 9
 """MAV_PARAM_TYPE of whole numbers, and of single-precision ones."""
@@ -50,8 +50,7 @@ class ParameterServer:
         strict = self._vehicle.family.whole_as_bits
         if name not in self.values or (strict and kind != self._kind(name)):
             return False
-        told = ParamValue(name, message.param_value, kind, 0, 0)
-        value = setting_in(told, self._vehicle).value
+        value = value_in(message, self._vehicle)
         if math.isfinite(value):
             self.values[name] = type(self.values[name])(value)
         return True
@@ -61,5 +60,5 @@ class ParameterServer:
 
     def _value(self, name: str) -> ParamValue:
         index, kind = list(self.values).index(name), self._kind(name)
-        number = on_the_wire(Setting(float(self.values[name]), kind), self._vehicle)
+        number = carried(float(self.values[name]), kind, self._vehicle)
         return ParamValue(name, number, kind, len(self.values), index)

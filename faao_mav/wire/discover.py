@@ -1,6 +1,5 @@
 """Who is on the link, and ready for a mission."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from faao_mav.autopilot import (
@@ -20,11 +19,9 @@ from faao_mav.wire.protocol import (
     NO_AUTOPILOT,
     Address,
     MavState,
+    listed,
 )
 from faao_mav.wire.transport import Origin
-
-_SHOWN = 5
-"""Vehicles that a message lists, at most; chosen."""
 
 _MAIN = 1
 """MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
@@ -156,17 +153,17 @@ def choose(
     if not found:
         who = "an autopilot" if system is None else f"the autopilot of system {system}"
         who += "" if component is None else f" with component number {component}"
-        others = f"there is only {_listed(heard.others)}" if heard.others else _NOTHING
+        others = f"there is only {listed(heard.others)}" if heard.others else _NOTHING
         problem = f"no heartbeat of {who} within {patience:g} s; {others}"
     elif twins := [each for each in found if len(each.origins) > 1]:
-        origins = " and ".join(twins[0].origins[:_SHOWN])
+        origins = " and ".join(twins[0].origins[:2])
         problem = (
             f"{twins[0].address} is heard from {origins}: more than one vehicle has this number, "
             "and which is meant is not known. Give each its own, or connect to one alone"
         )
     elif len(found) > 1:
         option = "component" if len({each.address.system for each in found}) == 1 else "system"
-        names = _listed(tuple(map(str, found)))
+        names = listed(tuple(map(str, found)))
         problem = f"several autopilots: {names}. Choose one with --{option}"
     elif not found[0].ready:
         problem = f"{found[0]} does not finish booting"
@@ -176,11 +173,6 @@ def choose(
     else:
         return found[0]
     raise LinkError(f"{connection}: {problem}")
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f"; and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return "; ".join(names[:_SHOWN]) + more
 
 
 def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:

@@ -4,10 +4,9 @@ Source: MAVLink developer guide, "Parameter Protocol". ArduPilot sends whole num
 PX4 as their bits (its "byte-wise encoding").
 """
 
-import math
 import struct
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from faao_mav.autopilot import VehicleType, vehicle_types
@@ -15,6 +14,7 @@ from faao_mav.autopilot.parameter import Parameter
 from faao_mav.errors import InputError
 from faao_mav.wire.machine import AT_ONCE, Talk
 from faao_mav.wire.messages import Envelope, ParamRequestRead, ParamSet, ParamValue
+from faao_mav.wire.protocol import listed
 from faao_mav.wire.questions import Pace, Questions, ask
 from faao_mav.wire.transfer.exchange import Peer
 
@@ -27,9 +27,6 @@ _INT32 = 6
 _AT_ONCE = 10
 """Names that are asked for at once. Chosen: half of the queue that ArduPilot has for them."""
 
-_SHOWN = 5
-"""Names that a message lists, at most; chosen."""
-
 _LEAST_WAIT, _TRIES = 0.25, 8
 """Seconds after which a name is asked for again at the earliest, and how often it is asked for.
 Chosen: of 50 parameters, over a link that loses a fifth each way, one stays unread in 1.4 % of all
@@ -37,41 +34,31 @@ readings; a name that the vehicle does not know costs 4 s."""
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
-    """The value of a parameter, and its MAV_PARAM_TYPE."""
-
-    value: float
-    kind: int
-
-
-@dataclass(frozen=True, slots=True)
 class Reading:
-    """What was read: `settings` by name; of `missing` no name was answered."""
+    """What was read: `values` and their `kinds` by name; of `missing` no name was answered.
 
-    settings: Mapping[str, Setting]
+    A kind is a MAV_PARAM_TYPE.
+    """
+
+    values: dict[str, float]
     missing: tuple[Names, ...] = ()
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The values by name."""
-        return {name: setting.value for name, setting in self.settings.items()}
+    kinds: Mapping[str, int] = field(default_factory=dict)
 
 
-def setting_in(message: ParamValue, vehicle: VehicleType | None) -> Setting:
-    """Return what `message` of `vehicle` says, in whose manner whole numbers are sent."""
-    value, kind = message.param_value, message.param_type
-    if vehicle is not None and vehicle.family.whole_as_bits and kind == _INT32:
+def value_in(message: ParamValue | ParamSet, vehicle: VehicleType | None) -> float:
+    """Return what `message` says, in whose manner `vehicle` sends whole numbers."""
+    value = message.param_value
+    if vehicle is not None and vehicle.family.whole_as_bits and message.param_type == _INT32:
         (value,) = struct.unpack("<i", struct.pack("<f", value))
-    return Setting(value, kind)
+    return value
 
 
-def on_the_wire(setting: Setting, vehicle: VehicleType | None) -> float:
-    """Return the number that carries `setting` to `vehicle`: the reverse of `setting_in`."""
-    if vehicle is not None and vehicle.family.whole_as_bits and setting.kind == _INT32:
-        whole = min(max(round(setting.value), -(2**31)), 2**31 - 1)
-        (bits,) = struct.unpack("<f", struct.pack("<i", whole))
-        return float(bits)
-    return setting.value
+def carried(value: float, kind: int, vehicle: VehicleType | None) -> float:
+    """Return the number that carries `value` of the type `kind`: the reverse of `value_in`."""
+    if vehicle is not None and vehicle.family.whole_as_bits and kind == _INT32:
+        whole = min(max(round(value), -(2**31)), 2**31 - 1)
+        (value,) = struct.unpack("<f", struct.pack("<i", whole))
+    return value
 
 
 def same_value(one: float, other: float) -> bool:
@@ -81,11 +68,6 @@ def same_value(one: float, other: float) -> bool:
     (True, False)
     """
     return struct.pack("<f", one) == struct.pack("<f", other)
-
-
-def close(one: float, other: float) -> bool:
-    """Tell whether two numbers, one of them converted from another unit, are one on the wire."""
-    return same_value(one, other) or math.isclose(one, other, rel_tol=1e-6)
 
 
 def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
@@ -98,9 +80,8 @@ def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
     left = list(dict.fromkeys(parameters))
     asked, total = Questions[Names](line, Pace(peer.timeouts), _LEAST_WAIT), len(left)
     names_of = {name: names for names in left for name in names}
-    settings: dict[str, Setting] = {}
-    missing: list[Names] = []
-    while (left or asked) and (settings or not missing):
+    values, kinds, missing = dict[str, float](), dict[str, int](), list[Names]()
+    while (left or asked) and (values or not missing):
         while left and sum(map(len, asked)) < _AT_ONCE:
             names = left.pop(0)
             asked.put(names, *(ParamRequestRead(peer.address, name, -1) for name in names))
@@ -108,10 +89,11 @@ def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
         line = yield asked.due
         told = _told(peer, line.heard)
         if told is not None and (names := names_of.get(told.param_id, ())) in asked:
-            settings[told.param_id] = setting_in(told, peer.vehicle)
+            values[told.param_id] = value_in(told, peer.vehicle)
+            kinds[told.param_id] = told.param_type
             asked.answer(names)
         missing += asked.repeat(_TRIES) if line.heard is None else []
-    return Reading(settings, (*missing, *asked, *left))
+    return Reading(values, (*missing, *asked, *left), kinds)
 
 
 def _told(peer: Peer, heard: Envelope | None) -> ParamValue | None:
@@ -121,7 +103,7 @@ def _told(peer: Peer, heard: Envelope | None) -> ParamValue | None:
     return heard.message
 
 
-def set_parameter(peer: Peer, name: str, setting: Setting) -> Talk[bool]:
+def set_parameter(peer: Peer, name: str, value: float, kind: int) -> Talk[bool]:
     """Set the parameter `name` of the vehicle of `peer`; tell whether it is set.
 
     It is told the value until it answers with it: setting it twice does no harm.
@@ -129,11 +111,10 @@ def set_parameter(peer: Peer, name: str, setting: Setting) -> Talk[bool]:
 
     def answer(envelope: Envelope) -> ParamValue | None:
         told = _told(peer, envelope)
-        same = told and same_value(setting_in(told, peer.vehicle).value, setting.value)
+        same = told and same_value(value_in(told, peer.vehicle), value)
         return told if told and told.param_id == name and same else None
 
-    number = on_the_wire(setting, peer.vehicle)
-    question = ParamSet(peer.address, name, number, setting.kind)
+    question = ParamSet(peer.address, name, carried(value, kind, peer.vehicle), kind)
     told = yield from ask(f"setting {name}", question, answer, peer.timeouts.silence)
     return told is not None
 
@@ -184,15 +165,9 @@ def check_settable(parameters: Iterable[str], source: object) -> None:
     other = [name for name in parameters if name not in own]
     if other:
         raise InputError(
-            f"{source}: {named(other)}: not among what a mission is timed for, which alone is set "
+            f"{source}: {listed(other)}: not among what a mission is timed for, which alone is set "
             "with it; set it with the ground station, and give the mission's own file"
         )
-
-
-def named(names: Sequence[str]) -> str:
-    """Return the first of some names in a line, and how many more there are."""
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more
 
 
 def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[Change, ...], str]]:
@@ -212,21 +187,20 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
         before = yield from read_parameters(peer, groups)
         unknown = [*before.missing]
     if unknown:
-        names = named([" or ".join(each) for each in unknown])
+        names = listed([" or ".join(each) for each in unknown])
         return (), f"parameters: the vehicle has no {names}: nothing was set or uploaded"
     asked: dict[str, float] = {}
     for names_of_one, parameter in groups.items():
-        name = next(each for each in names_of_one if each in before.settings)
+        name = next(each for each in names_of_one if each in before.values)
         number = number_in(parameter, name, wanted)
-        if number is not None and not same_value(number, before.settings[name].value):
+        if number is not None and not same_value(number, before.values[name]):
             asked[name] = number
     for name, number in asked.items():
-        kind = before.settings[name].kind
-        if not (yield from set_parameter(peer, name, Setting(number, kind))):
+        if not (yield from set_parameter(peer, name, number, before.kinds[name])):
             break
     after = yield from read_parameters(peer, [(name,) for name in asked])
     changes = tuple(
-        Change(name, before.settings[name].value, number, after.values.get(name))
+        Change(name, before.values[name], number, after.values.get(name))
         for name, number in asked.items()
     )
     failed = ", ".join(str(each) for each in changes if not each.made)

@@ -3,7 +3,7 @@
 Source: MAVLink developer guide, "Mission Protocol", and the MAVLink common set.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -94,6 +94,16 @@ def command_result(result: int) -> str:
     ('UNSUPPORTED (it does not know the command)', 'MAV_RESULT 99')
     """
     return _COMMAND_RESULTS.get(result, f"MAV_RESULT {result}")
+
+
+_SHOWN = 5
+"""Things that a message lists, at most; chosen."""
+
+
+def listed(things: Sequence[str]) -> str:
+    """Return the first of some things on one line, and how many more there are."""
+    more = f"; and {len(things) - _SHOWN} more" if len(things) > _SHOWN else ""
+    return "; ".join(things[:_SHOWN]) + more
 
 
 class MavSeverity(IntEnum):

@@ -30,7 +30,7 @@ from faao_mav.wire.messages import (
     SetMode,
     Timesync,
 )
-from faao_mav.wire.parameters import Reading, Setting
+from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import (
     GROUND_STATION,
     GROUND_STATION_TYPE,
@@ -47,9 +47,9 @@ METRE = 1e7 / 111_319.5
 def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
     """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
     values = mock.parameters.values.items()
-    settings = {name: Setting(value, 9) for name, value in values if name not in untold}
+    told = {name: value for name, value in values if name not in untold}
     lists = {part: mock.lists.items(part) for part in MissionType}
-    return Held(lists, Reading(settings), home=mock.home)
+    return Held(lists, Reading(told), home=mock.home)
 
 
 class Scene:

@@ -34,7 +34,7 @@ from faao_mav.wire.messages import (
     SetPositionTargetLocalNed,
     Statustext,
 )
-from faao_mav.wire.parameters import setting_in
+from faao_mav.wire.parameters import value_in
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.wire_items import wire_items
 
@@ -255,7 +255,7 @@ def test_parameters(kind: MockKind) -> None:
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
     vehicle = desk.machine.vehicle
-    told = {value.param_id: setting_in(value, vehicle).value for value in values}
+    told = {value.param_id: value_in(value, vehicle) for value in values}
     assert told.items() >= vehicle.defaults().items()
     second = values[1]
     assert desk.tell(ParamRequestRead(VEHICLE, "", 1)) == [second]

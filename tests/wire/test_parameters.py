@@ -18,12 +18,11 @@ from faao_mav.wire.messages import Envelope, ParamSet, ParamValue
 from faao_mav.wire.parameters import (
     Change,
     Names,
-    Setting,
-    on_the_wire,
+    carried,
     read_parameters,
     same_value,
     set_parameters,
-    setting_in,
+    value_in,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address
 
@@ -98,13 +97,12 @@ def test_other_vehicles_are_not_listened_to() -> None:
 
 @given(st.integers(-(2**31), 2**31 - 1))
 def test_whole_numbers_of_px4_are_their_bits(number: int) -> None:
-    carried = on_the_wire(Setting(number, INT32), PX4_COPTER)
-    assert on_the_wire(Setting(7.0, INT32), ARDUCOPTER) == 7.0
-    if math.isnan(carried):  # a bit of some of these is lost on the way
+    sent = carried(number, INT32, PX4_COPTER)
+    assert carried(7.0, INT32, ARDUCOPTER) == 7.0
+    if math.isnan(sent):  # a bit of some of these is lost on the way
         return
-    assert struct.pack("<f", carried) == struct.pack("<i", number)
-    found = setting_in(ParamValue("X", carried, INT32, 1, 0), PX4_COPTER)
-    assert found == Setting(number, INT32)
+    assert struct.pack("<f", sent) == struct.pack("<i", number)
+    assert value_in(ParamValue("X", sent, INT32, 1, 0), PX4_COPTER) == number
 
 
 @KINDS
@@ -167,5 +165,5 @@ def test_px4_takes_no_other_type_than_it_has() -> None:
     assert desk.tell(ParamSet(VEHICLE, "GF_ACTION", 3.0, REAL32)) == []
     (bits,) = struct.unpack("<f", struct.pack("<i", 3))
     (answer,) = desk.tell(ParamSet(VEHICLE, "GF_ACTION", bits, INT32))
-    assert setting_in(answer, PX4_COPTER) == Setting(3, INT32)
+    assert (value_in(answer, PX4_COPTER), answer.param_type) == (3, INT32)
     assert desk.machine.parameters.values["GF_ACTION"] == 3

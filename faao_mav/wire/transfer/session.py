@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 from faao_mav.mission.item import Mission
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import WireItem
-from faao_mav.wire.protocol import MavResult, MissionType, meaning
+from faao_mav.wire.protocol import MavResult, MissionType, listed, meaning
 from faao_mav.wire.transfer.exchange import TENTATIVE, Outcome, Peer, clear, download, upload
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
@@ -165,8 +165,7 @@ def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> s
     match report.verdict:
         case "different":
             wrong = [str(each) for each in report.differences if each.kind == "wrong"]
-            more = f"; and {len(wrong) - 5} more" if len(wrong) > 5 else ""
-            text = f"not what was sent: {'; '.join(wrong[:5])}{more}"
+            text = f"not what was sent: {listed(wrong)}"
         case "unread":
             text = "accepted, but it could not be read back; download it to see what is there"
         case "armed":
