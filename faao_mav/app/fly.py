@@ -2,16 +2,16 @@
 
 import asyncio
 import tempfile
-from collections.abc import Callable, Coroutine
+import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from nicegui import events, ui
 
-from faao_mav.app.planner import mistake
+from faao_mav.app.planner import said
 from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watched
-from faao_mav.app.workers import Interrupt, Workers
-from faao_mav.errors import FaaoError
+from faao_mav.app.workers import Workers, talk
 from faao_mav.fly.telling import as_text
 from faao_mav.workflow import Result
 
@@ -43,14 +43,14 @@ class Fly:
         self._result: Result | None = None  # of the finished flight
         self._file: Path | None = None  # that has its plan
         self._task: asyncio.Task[None] | None = None
-        self._interrupt = Interrupt()
+        self._interrupt = threading.Event()
         with ui.tab_panel("Fly"):
             self._connection = ui.input(
                 "Connection", value="udpout:127.0.0.1:14550", on_change=self._enable
             )
             self._connection.classes("w-full")
             with ui.row().classes("mt-2 gap-2"):
-                self._upload_button = _button("Upload and verify", self._upload)
+                self._upload_button = _button("Upload and verify", lambda: self._begin(uploaded))
                 self._watch_button = _button("Watch", self._watch)
                 self._leave_button = _button("Leave", self._interrupt.set)
             self._stands = ui.label().classes("uploaded stands")
@@ -96,30 +96,24 @@ class Fly:
 
     def _begin(self, work: Callable[..., str]) -> None:
         """Do `work` with the mission and the connection as they stand now."""
-        if self._result is None or self._task is not None:
-            return
-        self._stands.text = self._told.text = ""
-        asked = (self._interrupt, self._result, str(self._connection.value))
-        self._task = asyncio.create_task(
-            self._until_done(self._workers.talk(work, self._hear, *asked))
-        )
-        self._enable()
+        if self._result is not None and self._task is None:
+            asked = (self._result, str(self._connection.value))
+            self._task = asyncio.create_task(self._until_done(work, *asked))
+            self._stands.text = self._told.text = ""
+            self._enable()
 
-    async def _until_done(self, talk: Coroutine[Any, Any, str]) -> None:
+    async def _until_done(self, work: Callable[..., str], *asked: object) -> None:
         try:
-            said = await talk
+            told = await talk(work, self._hear, self._interrupt, *asked)
         except Exception as error:
-            said = _failure(error)
+            told = f"failed       {said(error)}"
         self._task = None
-        self._tell(said)
+        self._tell(told)
         self._enable()
 
     def _tell(self, text: str) -> None:
         lines = [*self._told.text.splitlines(), *text.splitlines()]
         self._told.text = "\n".join(lines[-_MOST_LINES:])
-
-    def _upload(self) -> None:
-        self._begin(uploaded)
 
     def _watch(self) -> None:
         self._draw("flown", [])
@@ -128,12 +122,11 @@ class Fly:
     def _hear(self, told: dict[str, Any]) -> None:
         if "note" in told:
             self._tell(as_text(told))
-            return
-        if "doing" in told:
+        elif "doing" in told:
             self._stands.text = told["doing"]
-            return
-        self._stands.text = f"{told['phase']:<10}{as_text(told)}"
-        self._draw("flies", [told["latitude"], told["longitude"]])
+        else:
+            self._stands.text = f"{told['phase']:<10}{as_text(told)}"
+            self._draw("flies", [told["latitude"], told["longitude"]])
 
     async def _debrief(self, event: events.UploadEventArguments) -> None:
         self._log.reset()
@@ -147,15 +140,10 @@ class Fly:
                 await event.file.save(log)
                 told = await self._workers.long(debriefed, result, log, event.file.name)
             except Exception as error:
-                self._debriefing.text = _failure(error)
+                self._debriefing.text = f"failed       {said(error)}"
                 return
         self._debriefing.text, places = told
         self._draw("flown", places)
-
-
-def _failure(error: Exception) -> str:
-    said = str(error) if isinstance(error, FaaoError | OSError) else mistake(error)
-    return f"failed       {said}"
 
 
 def _button(text: str, act: Callable[[], object]) -> ui.button:

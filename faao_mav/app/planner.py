@@ -14,34 +14,6 @@ _REST = 0.3
 pause in which a hand looks, longer than between two moves of a drag."""
 
 
-class Order:
-    """Which answers are shown: rough ones of any newer question, finished ones of the newest.
-
-    >>> order = Order()
-    >>> first, second = order.ask(), order.ask()
-    >>> order.take(first, finished=False), order.take(first, finished=True)
-    (True, False)
-    >>> order.take(second, finished=True), order.take(second, finished=False)
-    (True, False)
-    """
-
-    def __init__(self) -> None:
-        self.asked = 0
-        self._shown = (0, False)  # number of the question, and whether its answer is finished
-
-    def ask(self) -> int:
-        """Return the number of a new question."""
-        self.asked += 1
-        return self.asked
-
-    def take(self, question: int, *, finished: bool) -> bool:
-        """Return whether an answer to `question` is shown, and from now on no older one."""
-        stale = (finished and question != self.asked) or (question, finished) <= self._shown
-        if not stale:
-            self._shown = (question, finished)
-        return not stale
-
-
 class Planner:
     """The answers to the plan of one window.
 
@@ -51,7 +23,7 @@ class Planner:
 
     def __init__(self, workers: Workers, show: Callable[[Answer], None]) -> None:
         self._workers, self._show = workers, show
-        self._order = Order()
+        self._asked, self._answered = 0, 0  # numbers of questions, and of the last finished answer
         self._plan = ("", "")
         self._near: Real | None = None
         self._rough: asyncio.Task[None] | None = None
@@ -59,12 +31,12 @@ class Planner:
 
     def ask(self, text: str, source: str, *, soon: bool = True) -> None:
         """Ask for the answers to the plan `text`; not `soon`: without the rough ones."""
-        question, self._plan = self._order.ask(), (text, source)
+        self._asked, self._plan = self._asked + 1, (text, source)
         if soon and (self._rough is None or self._rough.done()):
             self._rough = asyncio.create_task(self._answer_roughly())
         if self._finished is not None:
             self._finished.cancel()
-        self._finished = asyncio.create_task(self._finish(question, _REST if soon else 0.0))
+        self._finished = asyncio.create_task(self._finish(_REST if soon else 0.0))
 
     def close(self) -> None:
         """Ask for nothing any more."""
@@ -74,35 +46,35 @@ class Planner:
 
     async def _answer_roughly(self) -> None:
         question = 0
-        while question < self._order.asked:
-            question = self._order.asked
-            job = self._workers.short(answers.rough, *self._plan, self._near)
-            answer = await _told(job)
-            if not answer.failed:  # the finished answer says whether there is a flight
-                self._take(question, answer, finished=False)
+        while question < self._asked:
+            question = self._asked
+            answer = await _told(self._workers.short(answers.rough, *self._plan, self._near))
+            # the finished answer says whether there is a flight
+            if not answer.failed and question > self._answered:
+                self._take(answer)
 
-    async def _finish(self, question: int, rest: float) -> None:
+    async def _finish(self, rest: float) -> None:
         await asyncio.sleep(rest)
         answer = await _told(self._workers.long(answers.finished, *self._plan))
-        self._take(question, answer, finished=True)
+        self._answered = self._asked
+        self._take(answer)
 
-    def _take(self, question: int, answer: Answer, *, finished: bool) -> None:
-        if self._order.take(question, finished=finished):
-            if answer.velocities is not None:
-                self._near = answer.velocities
-            self._show(answer)
+    def _take(self, answer: Answer) -> None:
+        if answer.velocities is not None:
+            self._near = answer.velocities
+        self._show(answer)
 
 
 async def _told(job: Awaitable[Answer]) -> Answer:
     """Return the answer of `job`, or the error in its stead."""
     try:
         return await job
-    except FaaoError as error:
-        return Answer(failed=str(error))
     except Exception as error:  # a page that waits for ever says nothing
-        return Answer(failed=mistake(error))
+        return Answer(failed=said(error))
 
 
-def mistake(error: Exception) -> str:
-    """Return what is said of an `error` that should not be."""
+def said(error: Exception) -> str:
+    """Return what is said of an `error`, of one that should not be too."""
+    if isinstance(error, FaaoError | OSError):
+        return str(error)
     return f"a mistake of faao-mav, please report it: {error!r}"

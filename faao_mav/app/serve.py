@@ -28,6 +28,10 @@ LOOPBACK = ("127.0.0.1", "localhost")
 
 _TOKEN_BYTES = 24
 
+_PATIENCE = 30.0
+"""Seconds that a page which does not answer keeps its plan: then it is made anew. Chosen: a busy
+machine answers within that."""
+
 _GRACE = 2
 """Seconds that a page which is open has to take its leave when the server ends. Chosen."""
 
@@ -69,7 +73,13 @@ def serve(
                 return Response(status_code=204)
             return Response(found, media_type=tiles.media_type)
 
-    ui.run_with(inner, dark=None, show_welcome_message=False)
+    ui.run_with(
+        inner,
+        dark=None,
+        show_welcome_message=False,
+        binding_refresh_interval=None,  # nothing is bound
+        reconnect_timeout=_PATIENCE,
+    )
     here = f"[{host}]" if ":" in host else host
     names = LOOPBACK if host in LOOPBACK else (here, *LOOPBACK)
     config = uvicorn.Config(

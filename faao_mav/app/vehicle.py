@@ -22,7 +22,7 @@ MISSION = "mission.plan"
 starts nothing on a vehicle that holds another mission."""
 
 Tell = Callable[[dict[str, Any]], object]
-"""What a job tells the page: a `note`, what it is `doing`, or how a flight stands."""
+"""What a talk tells the page: a `note`, what it is `doing`, or how a flight stands."""
 
 
 def fly_command(connection: str, plan: Path | None) -> str:
@@ -54,32 +54,26 @@ def _to_fly(result: Result) -> Conversion:
     return result.conversion
 
 
-def uploaded(tell: Tell, interrupted: Callable[[], bool], result: Result, connection: str) -> str:
+def uploaded(tell: Tell, look: Callable[[], None], result: Result, connection: str) -> str:
     """Upload the mission of `result` to `connection`, read it back, compare; return what to tell.
 
-    Nothing is armed or started. `interrupted` is asked for Ctrl-C, which cancels the upload.
-    Raises what `upload` raises.
+    Nothing is armed or started. `look` raises KeyboardInterrupt to cancel the upload. Raises what
+    `upload` raises.
     """
     from faao_mav.fly.seen import Flight
     from faao_mav.wire.client import upload
     from faao_mav.wire.upload_text import upload_text
 
-    said = ""
-
-    def look(what: str, done: int, total: int) -> None:
-        nonlocal said
-        before, said = said, f"{what}, {done} of {total}" if total else what
-        if said != before:
-            tell({"doing": said})
-        if interrupted():
-            raise KeyboardInterrupt
+    def observe(what: str, done: int, total: int) -> None:
+        look()
+        tell({"doing": f"{what}, {done} of {total}" if total else what})
 
     flight = Flight.planned(_to_fly(result), result.solution)
     report = upload(
         flight.mission,
         connection,
         made_for=flight.made_for,
-        observe=look,
+        observe=observe,
         note=lambda text: tell({"note": text}),
     )
     tell({"doing": ""})
@@ -87,21 +81,17 @@ def uploaded(tell: Tell, interrupted: Callable[[], bool], result: Result, connec
     return told if report.verified else f"{told}\nthe mission is not verified; do not fly it"
 
 
-def watched(tell: Tell, interrupted: Callable[[], bool], result: Result, connection: str) -> str:
+def watched(tell: Tell, look: Callable[[], None], result: Result, connection: str) -> str:
     """Watch the vehicle at `connection` fly the mission of `result`; return what became of it.
 
-    It is `faao-mission fly` without --arm: see `faao_mav.fly.fly`, and what that
-    raises. `tell` is given what a `Telling` says; `interrupted` is asked for Ctrl-C.
+    It is `faao-mission fly` without --arm: see `faao_mav.fly.fly`, and what that raises. `tell` is
+    given what a `Telling` says; `look` raises KeyboardInterrupt to leave the flight.
     """
     from faao_mav.fly.fly import fly
     from faao_mav.fly.seen import Flight
     from faao_mav.fly.telling import Telling
     from faao_mav.fly.watch import Watch
     from faao_mav.report.debrief import flight_lines
-
-    def look(*_: object) -> None:
-        if interrupted():
-            raise KeyboardInterrupt
 
     def watching(watch: Watch) -> None:
         telling(watch)
@@ -115,7 +105,7 @@ def watched(tell: Tell, interrupted: Callable[[], bool], result: Result, connect
         connection,
         lands=track is None or track.lands,
         watching=watching,
-        observe=look,
+        observe=lambda *_: look(),
         note=lambda text: tell({"note": text}),
     )
     told = joined(flight_lines(report, telling.debriefing(report)))

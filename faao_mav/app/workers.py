@@ -1,10 +1,10 @@
-"""The processes that compute for the page, so that nothing blocks it and what is stale ends."""
+"""What computes and talks for the page, so that nothing blocks it and what is stale ends."""
 
 import asyncio
 import multiprocessing
 import os
 import signal
-import time
+import threading
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -29,29 +29,11 @@ cancelled. A job looks once a second."""
 _ENDED = "the process that computes has ended; change the plan again"
 
 
-class Interrupt:
-    """What ends a talk early: once `set`, its job finds itself interrupted, as by Ctrl-C."""
-
-    def __init__(self) -> None:
-        self._end: Connection | None = None
-
-    def begin(self, end: Connection) -> None:
-        """Belong to the talk at the other `end`."""
-        self._end = end
-
-    def set(self) -> None:
-        """Interrupt the talk, if one goes on."""
-        if self._end is not None:
-            with suppress(OSError):
-                self._end.send(None)
-
-
 class Workers:
-    """One process that stays, for short jobs that share tables, and one for each other job.
+    """One process that stays, for short jobs that share tables, and one for each long job.
 
-    Setup, once: `Workers()`, which begins to load what jobs need; per job: `short`, `long` or
-    `talk`; at the end: `stop`. A job of a process of its own ends with its wait: cancelled, the
-    process is killed, that of a talk after `_GRACE` seconds in which it is interrupted.
+    Setup, once: `Workers()`, which begins to load what jobs need; per job: `short` or `long`; at
+    the end: `stop`. A long job that is cancelled is killed.
     """
 
     def __init__(self) -> None:
@@ -81,55 +63,19 @@ class Workers:
     async def long(self, work: Callable[..., T], *arguments: Any) -> T:
         """Return what `work` returns, or raise what it raises, of a process of its own."""
         async with self._free:
-            return await self._run(work, arguments)
-
-    async def talk(
-        self,
-        work: Callable[..., T],
-        hear: Callable[[Any], object],
-        interrupt: Interrupt,
-        *arguments: Any,
-    ) -> T:
-        """Do the same, but at once and giving way to nothing: what cannot wait for its turn.
-
-        The first arguments of `work` are two functions: what the one is given is given to `hear`,
-        the other returns whether `interrupt` was set since it was last asked.
-        """
-        return await self._run(work, arguments, hear, interrupt)
-
-    async def _run(
-        self,
-        work: Callable[..., T],
-        arguments: tuple[object, ...],
-        hear: Callable[[Any], object] | None = None,
-        interrupt: Interrupt | None = None,
-    ) -> T:
-        here, there = self._context.Pipe()
-        told = (there, work, arguments, interrupt is not None)
-        process = self._context.Process(target=_job, args=told)
-        process.daemon = True
-        process.start()
-        there.close()
-        if interrupt is not None:
-            interrupt.begin(here)
-        try:
-            # a process that is killed closes its end: the thread that waits ends too
-            while (message := await asyncio.to_thread(here.recv))[0] == "tells":
-                if hear is not None:
-                    hear(message[1])
-        except EOFError:
-            raise FaaoError(_ENDED) from None
-        except asyncio.CancelledError:
-            if interrupt is not None:
-                interrupt.set()
-                await _ended(process)
-            raise
-        finally:
-            process.kill()
-        if message[0] == "fails":
-            raise message[1]
-        value: T = message[1]
-        return value
+            here, there = self._context.Pipe(duplex=False)
+            process = self._context.Process(target=_job, args=(there, work, arguments), daemon=True)
+            process.start()
+            there.close()
+            try:
+                # a process that is killed closes its end: the thread that waits ends too
+                value, error = await asyncio.to_thread(here.recv)
+            except EOFError:
+                raise FaaoError(_ENDED) from None
+            finally:
+                process.kill()
+        returned: T = _returned(value, error)
+        return returned
 
     def stop(self) -> None:
         """End all processes, whatever they do; those of others, as of joblib, go on."""
@@ -140,11 +86,43 @@ class Workers:
                 process.kill()
 
 
-async def _ended(process: Any) -> None:
-    """Wait for the end of `process`, `_GRACE` seconds at most."""
-    last = time.monotonic() + _GRACE
-    while process.is_alive() and time.monotonic() < last:
-        await asyncio.sleep(0.05)
+async def talk(
+    work: Callable[..., T],
+    hear: Callable[[Any], object],
+    interrupt: threading.Event,
+    *arguments: Any,
+) -> T:
+    """Return what `work` returns, or raise what it raises, of a thread of its own.
+
+    The first arguments of `work` are two functions: what the one is given is given to `hear`, the
+    other raises KeyboardInterrupt once `interrupt` was set. Cancelled, it is interrupted.
+    """
+    loop = asyncio.get_running_loop()
+    ended: asyncio.Future[tuple[Any, Exception | None]] = loop.create_future()
+
+    def call(act: Callable[[Any], object], value: object) -> None:
+        with suppress(RuntimeError):  # the server has ended meanwhile
+            loop.call_soon_threadsafe(lambda: None if ended.done() else act(value))
+
+    def look() -> None:
+        if interrupt.is_set():
+            interrupt.clear()
+            raise KeyboardInterrupt
+
+    def run() -> None:
+        told = (lambda said: call(hear, said), look, *arguments)
+        call(ended.set_result, _outcome(work, told))
+
+    interrupt.clear()
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        returned: T = _returned(*await ended)
+        return returned
+    except asyncio.CancelledError:
+        interrupt.set()
+        await asyncio.to_thread(thread.join, _GRACE)
+        raise
 
 
 def _prepare() -> None:
@@ -152,25 +130,23 @@ def _prepare() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _job(
-    end: Connection, work: Callable[..., object], arguments: tuple[object, ...], talks: bool
-) -> None:
+def _job(end: Connection, work: Callable[..., object], arguments: tuple[object, ...]) -> None:
     _prepare()
-    if talks:
-        arguments = (lambda told: end.send(("tells", told)), lambda: _interrupted(end), *arguments)
-    elif hasattr(os, "nice"):
+    if hasattr(os, "nice"):
         os.nice(_NICE)
+    end.send(_outcome(work, arguments))
+
+
+def _outcome(
+    work: Callable[..., object], arguments: tuple[object, ...]
+) -> tuple[object, Exception | None]:
     try:
-        outcome: tuple[str, object] = "returns", work(*arguments)
+        return work(*arguments), None
     except Exception as error:  # told to whom has asked
-        outcome = "fails", error
-    end.send(outcome)
+        return None, error
 
 
-def _interrupted(end: Connection) -> bool:
-    """Return whether the page has asked to end, or has itself ended."""
-    if not end.poll():
-        return False
-    with suppress(EOFError):
-        end.recv()
-    return True
+def _returned(value: Any, error: Exception | None) -> Any:
+    if error is not None:
+        raise error
+    return value

@@ -8,35 +8,12 @@ from functools import partial
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from faao_mav.app import answers, planner
 from faao_mav.app.answers import Answer
-from faao_mav.app.planner import Order, Planner
+from faao_mav.app.planner import Planner
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError
-
-
-@given(st.data())
-def test_the_last_question_wins_and_finished_beats_rough(data: st.DataObject) -> None:
-    order, shown = Order(), (0, False)
-    for asks in data.draw(st.lists(st.booleans(), min_size=1, max_size=20)):
-        if asks:
-            order.ask()
-            continue
-        question = data.draw(st.integers(1, max(1, order.asked)))
-        answer = (question, data.draw(st.booleans()))
-        if order.take(question, finished=answer[1]):
-            assert answer > shown
-            assert not answer[1] or question == order.asked
-            shown = answer
-    if order.asked:  # the finished answer to the last question is shown, once
-        last = (order.asked, True)
-        assert order.take(order.asked, finished=True) == (shown != last)
-        assert not any(
-            order.take(k + 1, finished=f) for k in range(order.asked) for f in (False, True)
-        )
 
 
 class Held:

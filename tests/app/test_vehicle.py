@@ -2,6 +2,7 @@
 
 import asyncio
 import shlex
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -16,7 +17,7 @@ from served import running
 
 from faao_mav import plan_mission
 from faao_mav.app.vehicle import fly_command, uploaded, watched
-from faao_mav.app.workers import Interrupt, Workers
+from faao_mav.app.workers import talk
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.fly.fly import fly
 from faao_mav.fly.seen import Flight
@@ -60,27 +61,23 @@ def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
             seen.set()
 
     async def run(connection: str, mock: MockAutopilot) -> str:
-        workers, asked = Workers(), (result, connection)
-        try:
-            before = await workers.talk(watched, hear, Interrupt(), *asked)
-            assert before.startswith("different")
-            assert "verified" in await workers.talk(uploaded, hear, Interrupt(), *asked)
-            watch = asyncio.create_task(workers.talk(watched, hear, Interrupt(), *asked))
-            while "waiting" not in phases:
-                await asyncio.sleep(0.05)
-            assert not mock.armed
-            assert result.conversion is not None
-            flight = Flight.planned(result.conversion, result.solution)
-            flown = asyncio.create_task(asyncio.to_thread(fly, flight, connection, arm=True))
-            await seen.wait()
-            watch.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await watch
-            report = await flown
-            assert report.ending is not None
-            return report.ending.kind
-        finally:
-            workers.stop()
+        asked = (hear, threading.Event(), result, connection)
+        assert (await talk(watched, *asked)).startswith("different")
+        assert "verified" in await talk(uploaded, *asked)
+        watch = asyncio.create_task(talk(watched, *asked))
+        while "waiting" not in phases:
+            await asyncio.sleep(0.05)
+        assert not mock.armed
+        assert result.conversion is not None
+        flight = Flight.planned(result.conversion, result.solution)
+        flown = asyncio.create_task(asyncio.to_thread(fly, flight, connection, arm=True))
+        await seen.wait()
+        watch.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await watch
+        report = await flown
+        assert report.ending is not None
+        return report.ending.kind
 
     with vehicle(result) as (connection, mock):
         assert asyncio.run(run(connection, mock)) == "finished"
@@ -88,12 +85,9 @@ def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
 
 def test_an_upload_that_is_left_is_cancelled_on_the_vehicle(result: Result) -> None:
     async def run(connection: str) -> None:
-        workers, interrupt = Workers(), Interrupt()
-        try:
-            asyncio.get_running_loop().call_later(3, interrupt.set)
-            await workers.talk(uploaded, print, interrupt, result, connection)
-        finally:
-            workers.stop()
+        interrupt = threading.Event()
+        asyncio.get_running_loop().call_later(3, interrupt.set)
+        await talk(uploaded, print, interrupt, result, connection)
 
     slow = Faults(loss=0.2, rate=300)
     with (
@@ -107,7 +101,7 @@ def test_what_does_not_pass_validation_is_neither_uploaded_nor_watched(result: R
     useless = replace(result, conversion=None)
     for act in (uploaded, watched):
         with pytest.raises(PlanError, match="does not pass validation"):
-            act(print, lambda: False, useless, "udpout:127.0.0.1:1")
+            act(print, lambda: None, useless, "udpout:127.0.0.1:1")
 
 
 @given(st.text(), st.text(min_size=1).filter(lambda name: "\0" not in name and "/" not in name))
