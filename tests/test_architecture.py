@@ -107,11 +107,9 @@ def test_every_public_name_can_be_had() -> None:
 
 WAITING = (
     ("cli.main", {"numpy", "cvxpy", "pyproj", "pydantic", "rich.progress"}),
-    ("cli.validate", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
-    ("cli.upload", {"numpy", "pymavlink"}),
-    ("cli.download", {"numpy", "pymavlink"}),
-    ("cli.fly", {"numpy", "pymavlink", "pydantic"}),
-    ("cli.debrief", {"numpy", "pymavlink", "pydantic"}),
+    ("cli.missions", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
+    ("cli.transfers", {"numpy", "pymavlink"}),
+    ("cli.flights", {"numpy", "pymavlink", "pydantic"}),
     ("cli.autopilot", {"numpy", "pymavlink"}),
     ("cli.study", {"numpy", "joblib", "matplotlib"}),
     ("cli.app", {"numpy", "nicegui", "ruamel", "pydantic"}),

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
-from faao_mav.cli.progress import optimizer_progress
+from faao_mav.cli.shared import optimizer_progress
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.optimizer.solution import Progress

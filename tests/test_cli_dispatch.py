@@ -67,5 +67,5 @@ def test_help_loads_nothing_that_costs() -> None:
         "except SystemExit: print(*sys.modules)"
     )
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout
-    assert "faao_mav.cli.convert" in loaded
+    assert "faao_mav.cli.missions" in loaded
     assert not {"numpy", "scipy", "pymavlink", "ruamel", "pydantic"} & set(loaded.split())

@@ -56,7 +56,7 @@ autopilot --listen nonsense | expected udpin:HOST:PORT
 autopilot --home 1,2 | expected LAT,LON,ALT
 autopilot --home 91,2,3 | latitude
 autopilot --home 0,0,1e30 | an altitude of at most 100000 m
-autopilot --home 0,0,nan | an altitude of at most 100000 m
+autopilot --home 0,0,nan | expected LAT,LON,ALT
 autopilot --parameters still.param | WPNAV_ACCEL
 fly missing.waypoints --to {NOWHERE} | missing.waypoints
 fly m.waypoints --to nowhere | nowhere

@@ -11,6 +11,7 @@ from faao_mav.cli.shared import (
     check_known,
     exit_status,
     option,
+    read_numbers,
     read_wind,
 )
 from faao_mav.errors import InputError
@@ -153,12 +154,8 @@ def read_home(text: str) -> "Home":
     """Return the home that `LAT,LON,ALT` names; raises `InputError`."""
     from faao_mav.mission.item import Home
 
-    try:
-        latitude, longitude, altitude = map(float, text.split(","))
-    except ValueError:
-        raise InputError(
-            f"--home {text}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
-        ) from (None)
-    if not abs(altitude) <= _HIGHEST:
+    wanted = f"--home {text}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
+    latitude, longitude, altitude = read_numbers(text, 3, wanted)
+    if abs(altitude) > _HIGHEST:
         raise InputError(f"--home {text}: expected an altitude of at most {_HIGHEST:g} m")
     return Home(latitude, longitude, altitude)

@@ -1,6 +1,5 @@
 """`faao-mission link LOG... --station LAT,LON,HEIGHT --out link.yaml`: a link fitted to logs."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.shared import AsJson, File, Number, check_page, exit_status, note, option, show
+from faao_mav.cli.shared import (
+    AsJson,
+    File,
+    Number,
+    check_page,
+    exit_status,
+    note,
+    option,
+    read_numbers,
+    show,
+)
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_apart, check_ending, check_writable, write_whole
 
@@ -54,7 +63,7 @@ def link(
     input.
     """
     wanted = f"--station {station}: expected LAT,LON,HEIGHT, degrees and m"
-    place = _numbers(station.split(","), 3, wanted)
+    place = read_numbers(station, 3, wanted)
     if abs(place[0]) > 90 or abs(place[1]) > 180:
         raise InputError(wanted)
     units = {}
@@ -64,7 +73,7 @@ def link(
         if not told:
             raise InputError(f"--unit {each}: expected COLUMN=UNIT, as in rssi=dbm")
     points = [
-        _numbers(each.split("="), 2, f"--calibrate {each}: expected COUNT=DBM, two numbers")
+        read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
         for each in calibrate or []
     ]
     if len(points) > 2 or len({count for count, *_ in points}) < len(points):
@@ -128,14 +137,3 @@ def _flights(
         t, up = record.t[known], (record.altitude - record.home)[known]
         where = record.latitude[known], record.longitude[known]
         yield samples_at(path, station, t, *where, up, level), unit
-
-
-def _numbers(parts: Sequence[str], count: int, wanted: str) -> tuple[float, ...]:
-    """Return `count` finite numbers; raises `InputError` with what is `wanted` for others."""
-    try:
-        numbers = tuple(map(float, parts))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
-        raise InputError(wanted)
-    return numbers

@@ -15,16 +15,13 @@ from typer.core import TyperGroup
 
 from faao_mav.cli.app import app as page
 from faao_mav.cli.autopilot import autopilot
-from faao_mav.cli.convert import convert
-from faao_mav.cli.debrief import debrief
-from faao_mav.cli.download import download
-from faao_mav.cli.fly import fly
+from faao_mav.cli.flights import debrief, fly
 from faao_mav.cli.link import link
+from faao_mav.cli.missions import convert, validate
 from faao_mav.cli.plan import plan
 from faao_mav.cli.shared import note
 from faao_mav.cli.study import study
-from faao_mav.cli.upload import upload
-from faao_mav.cli.validate import validate
+from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import HangUp
 
 _ALLOCATIONS = 50_000

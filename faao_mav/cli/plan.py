@@ -71,8 +71,8 @@ def plan(
     validation found errors, or it is not known to be on the vehicle; 2 unusable arguments or
     input.
     """
-    from faao_mav.cli.progress import optimizer_progress
-    from faao_mav.cli.upload import as_dict as upload_as_dict
+    from faao_mav.cli.shared import optimizer_progress
+    from faao_mav.cli.transfers import as_dict as upload_as_dict
     from faao_mav.report import summary
     from faao_mav.report.parts import write_part
     from faao_mav.workflow import plan_mission
@@ -179,7 +179,7 @@ def _sound(result: "Result") -> bool:
 def _upload(
     result: "Result", connection: str, system: int | None, allow_armed: bool, shown: bool
 ) -> "UploadReport":
-    from faao_mav.cli.progress import transfer_progress
+    from faao_mav.cli.shared import transfer_progress
     from faao_mav.fly.seen import Flight
     from faao_mav.wire.client import upload
 

@@ -1,9 +1,12 @@
-"""What the commands share: options, exit statuses, messages."""
+"""What the commands share: options, exit statuses, messages, progress."""
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial, wraps
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -13,8 +16,12 @@ from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
-    from faao_mav.mission.formats import MissionFile
+    from faao_mav.mission.formats import MissionFile, PlanTarget, Rendered
+    from faao_mav.mission.item import Mission
+    from faao_mav.optimizer.solution import Observer, Progress, Solution
     from faao_mav.plan import Vector
+    from faao_mav.study import StudyRow
+    from faao_mav.wire.link import Observe
 
 
 def option(value: str, text: str, *names: str, **limits: Any) -> Any:
@@ -38,17 +45,9 @@ System: TypeAlias = Annotated[
 AllowArmed: TypeAlias = Annotated[
     bool, flag("--allow-armed", "Replace the mission of an armed vehicle too.")
 ]
-Component: TypeAlias = Annotated[
-    int | None, option("N", "The autopilot's component number.", min=1, max=255)
-]
-OwnSystem: TypeAlias = Annotated[
-    int | None, option("N", "The system number to speak as; without: 246.", min=1, max=255)
-]
 Radio: TypeAlias = Annotated[
     str | None, option("udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines.")
 ]
-Log: TypeAlias = Annotated[File, option("F.tlog", "Write a log of the exchange.")]
-Wait: TypeAlias = Annotated[float, option("S", "How long to wait for the vehicle, s.", min=0.1)]
 SigningKey: TypeAlias = Annotated[
     File, option("F", "File with the key for signed packets: 32 bytes, or in hex.")
 ]
@@ -57,6 +56,22 @@ Whose: TypeAlias = Annotated[
 ]
 Aircraft: TypeAlias = Annotated[
     str | None, option("NAME", "What flies it: copter or plane.", "--type")
+]
+PlanFile: TypeAlias = Annotated[
+    File,
+    option(
+        "PLAN.yaml",
+        "The plan: its vehicle, its limits, and the link that it is to deliver.",
+        "--plan",
+    ),
+]
+SolutionFile: TypeAlias = Annotated[
+    File,
+    option(
+        "RESULT.npz",
+        "Instead of --plan: what --save wrote, with the plan in it, already solved.",
+        "--solution",
+    ),
 ]
 AsJson: TypeAlias = Annotated[bool, flag("--json", "Print one JSON object instead of the text.")]
 
@@ -72,6 +87,42 @@ def exit_status() -> Iterator[None]:
     except FaaoError as error:
         note(str(error))
         raise typer.Exit(2 if isinstance(error, InputError) else 1) from None
+
+
+def with_link(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a `command` the options of a link to a vehicle, which it takes as `link`.
+
+    They are `LinkOptions` by their names, and its `note` prints.
+    """
+
+    def options(
+        system: System = None,
+        component: Annotated[
+            int | None, option("N", "The autopilot's component number.", min=1, max=255)
+        ] = None,
+        own_system: Annotated[
+            int | None, option("N", "The system number to speak as; without: 246.", min=1, max=255)
+        ] = None,
+        log: Annotated[File, option("F.tlog", "Write a log of the exchange.")] = None,
+        wait: Annotated[
+            float, option("S", "How long to wait for the vehicle, s.", "--timeout", min=0.1)
+        ] = 10.0,
+        signing_key: SigningKey = None,
+    ) -> dict[str, Any]:
+        return locals() | {"note": note}
+
+    own, shared = signature(command).parameters, signature(options).parameters
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        link = options(**{name: given.pop(name) for name in shared})
+        command(**given, link=link)
+
+    taken = [each for each in own.values() if each.name != "link"]
+    parameters = [*taken, *shared.values()]
+    vars(run)["__signature__"] = signature(command).replace(parameters=parameters)
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    return run
 
 
 def check_known(autopilot: str | None, kind: str | None) -> None:
@@ -92,14 +143,25 @@ def read_wind(given: str | None) -> "Vector | None":
     from faao_mav.plan import Wind
     from faao_mav.plan.keys import reference
 
-    parts, keys = given.split(","), ("site.wind.speed", "site.wind.from")
+    keys = ("site.wind.speed", "site.wind.from")
+    wanted = " and ".join(reference()[key].accepted for key in keys)
+    wanted = f"--wind {given}: expected SPEED,FROM: {wanted}"
+    speed, start = read_numbers(given, 2, wanted)
     try:
-        speed, start = map(float, parts)
-        wind = TypeAdapter(Wind).validate_python({"speed": speed, "from": start})
+        return TypeAdapter(Wind).validate_python({"speed": speed, "from": start}).velocity
     except ValueError:
-        wanted = " and ".join(reference()[key].accepted for key in keys)
-        raise InputError(f"--wind {given}: expected SPEED,FROM: {wanted}") from None
-    return wind.velocity
+        raise InputError(wanted) from None
+
+
+def read_numbers(given: str, count: int, wanted: str, between: str = ",") -> tuple[float, ...]:
+    """Return `count` finite numbers; raises `InputError` with what is `wanted` for others."""
+    try:
+        numbers = tuple(map(float, given.split(between)))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise InputError(wanted)
+    return numbers
 
 
 def read_noted(mission_file: Path) -> "MissionFile":
@@ -110,6 +172,16 @@ def read_noted(mission_file: Path) -> "MissionFile":
     for line in file.warnings:
         note(line)
     return file
+
+
+def write_noted(mission: "Mission", out: Path, target: "PlanTarget | None") -> "Rendered":
+    """Write a mission and return its files, and note what their format cannot hold."""
+    from faao_mav.mission.formats import write_mission
+
+    written = write_mission(mission, out, target)
+    for line in written.lost:
+        note(f"{out}: {line}")
+    return written
 
 
 def check_page(report: Path | None, inputs: Mapping[str, Path | None]) -> None:
@@ -131,3 +203,76 @@ def show(
 def note(message: str) -> None:
     """Say something that the result does not say, on standard error."""
     typer.echo(f"faao-mission: {message}", err=True)
+
+
+def planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | None":
+    """Return the solution saved, or that of the plan; None without either.
+
+    Raises `InputError` where both are given.
+    """
+    if plan_file is not None and solution_file is not None:
+        raise InputError("--plan and --solution: give one; the solution has its plan in it")
+    if solution_file is not None:
+        from faao_mav.optimizer.solution import load_solution
+
+        return load_solution(solution_file)
+    if plan_file is None:
+        return None
+    from faao_mav.optimizer.optimize import optimize
+    from faao_mav.plan import read_plan
+
+    plan = read_plan(plan_file)
+    with optimizer_progress(shown=sys.stderr.isatty()) as observe:
+        return optimize(plan, observe=observe)
+
+
+@contextmanager
+def optimizer_progress(*, shown: bool) -> "Iterator[Observer | None]":
+    """Give an observer of the work on a plan."""
+    with _line("BarColumn", "TimeElapsedColumn", "{task.description}", shown=shown) as update:
+
+        def observe(now: "Progress") -> None:
+            step = f"iteration {now.iteration} of at most {now.max_iterations}"
+            best = f", {now.best_rate:.4f} bit/s/Hz" if now.best_rate else ""
+            update(description=f"{step}: {now.stage}{best}")
+
+        yield observe if shown else None
+
+
+@contextmanager
+def transfer_progress(*, shown: bool) -> "Iterator[Observe | None]":
+    """Give an observer of a transfer to or from a vehicle."""
+    with _line("{task.description}", "BarColumn", "MofNCompleteColumn", shown=shown) as update:
+
+        def observe(what: str, done: int, total: int) -> None:
+            update(description=what, completed=done, total=total or None)
+
+        yield observe if shown else None
+
+
+@contextmanager
+def study_progress(total: int, *, shown: bool) -> "Iterator[Callable[[StudyRow], None] | None]":
+    """Give an observer of the `total` rows of a study."""
+    columns = ("BarColumn", "MofNCompleteColumn", "TimeRemainingColumn", "{task.description}")
+    with _line(*columns, shown=shown) as update:
+        update(total=total, description="")
+        yield (lambda row: update(advance=1, description=row.scheme)) if shown else None
+
+
+@contextmanager
+def _line(*columns: str, shown: bool) -> Iterator[Callable[..., Any]]:
+    """Give what updates the line, if one is `shown`.
+
+    `columns` are names of classes of `rich.progress`, or templates of text.
+    """
+    if not shown:
+        yield lambda **_: None
+        return
+    from rich import progress
+    from rich.console import Console
+
+    made = [
+        progress.TextColumn(name) if "{" in name else getattr(progress, name)() for name in columns
+    ]
+    with progress.Progress(*made, console=Console(stderr=True), transient=True) as line:
+        yield partial(line.update, line.add_task("starting", total=None))

@@ -54,7 +54,7 @@ def study(
 
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
-    from faao_mav.cli.progress import study_progress
+    from faao_mav.cli.shared import study_progress
     from faao_mav.plan import read_plan
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.sections import Study

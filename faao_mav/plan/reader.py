@@ -183,9 +183,7 @@ def _describe(error: ValidationError, source: str, files: Mapping[tuple[str, ...
     return "\n".join(f"{source}: {line}" for line in lines)
 
 
-def _lines(
-    details: Sequence[ErrorDetails], files: Mapping[tuple[str, ...], str]
-) -> Iterator[str]:
+def _lines(details: Sequence[ErrorDetails], files: Mapping[tuple[str, ...], str]) -> Iterator[str]:
     known = reference()
     for detail in details:
         value, kind, loc = detail["input"], detail["type"], detail["loc"]

@@ -9,7 +9,7 @@ from harness import Target
 from tapes import answer, converse, datagrams, mutated, packed, recorded, tape_of
 
 from faao_mav.autopilot import vehicle_type
-from faao_mav.cli.upload import as_dict
+from faao_mav.cli.transfers import as_dict
 from faao_mav.errors import FaaoError
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import faao_mav
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import plan_target
-from faao_mav.cli.validate import validate
+from faao_mav.cli.missions import validate
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.formats import render_mission
 from faao_mav.mission.item import Mission

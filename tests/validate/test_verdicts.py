@@ -14,7 +14,7 @@ from judged import HOME
 from typer.testing import CliRunner
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.cli.validate import validate as command
+from faao_mav.cli.missions import validate as command
 from faao_mav.errors import MissionFileError
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import read_mission, read_mission_file

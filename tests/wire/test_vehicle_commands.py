@@ -14,9 +14,8 @@ from stations import FENCE, HOME, RALLY, a_mission, vehicle_of
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot
-from faao_mav.cli.download import download
-from faao_mav.cli.progress import transfer_progress
-from faao_mav.cli.upload import upload
+from faao_mav.cli.shared import transfer_progress
+from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence

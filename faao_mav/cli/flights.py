@@ -1,4 +1,4 @@
-"""`faao-mission fly`: watch a mission to its end, beside its plan."""
+"""`faao-mission fly` and `debrief`: a flight beside its plan, as it goes on, and from its log."""
 
 import json
 from dataclasses import asdict
@@ -7,23 +7,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from faao_mav.cli.planned import PlanFile, SolutionFile, planned
 from faao_mav.cli.shared import (
     VEHICLE,
-    Component,
-    Log,
-    OwnSystem,
+    AsJson,
+    File,
+    PlanFile,
     Radio,
-    SigningKey,
+    SolutionFile,
     System,
-    Wait,
+    check_page,
     exit_status,
     flag,
     note,
     option,
+    planned,
     read_noted,
+    show,
+    with_link,
 )
-from faao_mav.errors import InputError
+from faao_mav.errors import FaaoError, InputError
+from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
     from faao_mav.autopilot import Track
@@ -32,6 +35,7 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
 
 
+@with_link
 @exit_status()
 def fly(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
@@ -51,12 +55,8 @@ def fly(
     ] = False,
     radio: Radio = None,
     as_json: Annotated[bool, flag("--json", "Print JSON objects, one a line.")] = False,
-    system: System = None,
-    component: Component = None,
-    own_system: OwnSystem = None,
-    log: Log = None,
-    timeout: Wait = 10.0,
-    signing_key: SigningKey = None,
+    *,
+    link: dict[str, Any],
 ) -> None:
     """Watch a vehicle fly a mission that it holds, to the end.
 
@@ -114,13 +114,7 @@ def fly(
         untimed=untimed,
         rate=rate,
         watching=telling,
-        system=system,
-        component=component,
-        own_system=own_system,
-        log=log,
-        signing_key=signing_key,
-        wait=timeout,
-        note=note,
+        **link,
     )
     ending = report.ending
     found = telling.debriefing(report)
@@ -160,7 +154,6 @@ def _flight(
 def _predicted(flight: "Flight") -> "Track | None":
     """Return the predicted flight of the mission; None, which is noted, if there is none."""
     from faao_mav.autopilot.predict import predict
-    from faao_mav.errors import FaaoError
 
     wind = flight.solution.plan.wind if flight.solution is not None else (0.0, 0.0)
     try:
@@ -168,3 +161,48 @@ def _predicted(flight: "Flight") -> "Track | None":
     except FaaoError as error:
         note(f"the flight is not predicted: {error}")
         return None
+
+
+@exit_status()
+def debrief(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg.")],
+    plan_file: PlanFile = None,
+    solution_file: SolutionFile = None,
+    system: System = None,
+    report: Annotated[File, option("PAGE.html", "One page with all three tracks.")] = None,
+    radio: Radio = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what became of a plan, from the log of its flight.
+
+    Finds the relay flight in the log of an ArduPilot (.bin), a PX4 (.ulg, with pyulog) or a ground
+    station (.tlog), and tells how late it was, how far from plan and path, and what each hop
+    carried along the real track with the planned precoders, beside what was planned and predicted.
+    Of several vehicles in a .tlog it is the one whose flight is the plan's, or that of --system.
+    --radio replays the flight to radios, at the pace at which it was flown.
+
+    Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
+    """
+    if plan_file is None and solution_file is None:
+        raise InputError("--plan or --solution: give the plan that was flown")
+    check_page(report, {"LOG": log, "--plan": plan_file, "--solution": solution_file})
+    from faao_mav.fly.logs import read_log
+    from faao_mav.fly.radio import Radios
+    from faao_mav.report.debrief import FromLog
+    from faao_mav.report.summary import joined
+    from faao_mav.workflow import Result, with_mission
+
+    records = read_log(log, system)
+    solution = planned(plan_file, solution_file)
+    assert solution is not None
+    radios = None if radio is None else Radios(solution, radio)
+    told = FromLog.of(records, with_mission(Result(solution)), str(log))
+    if report is not None:
+        from faao_mav.report.page import render_report
+
+        page = render_report(told, title=log.name)
+        write_whole(report, page.encode())
+    show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
+    if radios is not None:
+        count = radios.replay(told.record.line(solution, told.found.start))
+        note(f"{count} slots were told to {radio}")

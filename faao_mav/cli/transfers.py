@@ -1,4 +1,4 @@
-"""`faao-mission upload`: a mission file to a vehicle, verified."""
+"""`faao-mission upload` and `download`: a mission to a vehicle, verified, and what one holds."""
 
 import sys
 from pathlib import Path
@@ -10,25 +10,23 @@ from faao_mav.cli.shared import (
     VEHICLE,
     AllowArmed,
     AsJson,
-    Component,
     File,
-    Log,
-    OwnSystem,
-    SigningKey,
-    System,
-    Wait,
     exit_status,
     flag,
     note,
     option,
     read_noted,
     show,
+    transfer_progress,
+    with_link,
+    write_noted,
 )
 
 if TYPE_CHECKING:
     from faao_mav.wire.client import UploadReport
 
 
+@with_link
 @exit_status()
 def upload(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
@@ -41,13 +39,9 @@ def upload(
         bool, flag("--clear-rest", "Clear a fence and rally points that MISSION does not have.")
     ] = False,
     as_json: AsJson = False,
-    system: System = None,
-    component: Component = None,
     allow_armed: AllowArmed = False,
-    own_system: OwnSystem = None,
-    log: Log = None,
-    timeout: Wait = 10.0,
-    signing_key: SigningKey = None,
+    *,
+    link: dict[str, Any],
 ) -> None:
     """Upload a mission, read it back and compare.
 
@@ -59,7 +53,6 @@ def upload(
     unusable arguments or input.
     """
     from faao_mav.autopilot.files import made_for
-    from faao_mav.cli.progress import transfer_progress
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.wire.client import upload as run
     from faao_mav.wire.parameters import check_settable
@@ -72,18 +65,12 @@ def upload(
         report = run(
             file.mission,
             to,
-            system=system,
-            component=component,
-            own_system=own_system,
             allow_armed=allow_armed,
             made_for=made_for(mission_file, file),
             parameters=values,
             clear_rest=clear_rest,
-            log=log,
-            signing_key=signing_key,
-            wait=timeout,
             observe=observe,
-            note=note,
+            **link,
         )
     show(lambda: as_dict(report), lambda: [upload_text(report)], as_json=as_json)
     if not report.verified:
@@ -133,3 +120,44 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(each) for each in value]
     return None if value != value else value
+
+
+@with_link
+@exit_status()
+def download(
+    source: Annotated[str, option("CONNECTION", VEHICLE, "--from")],
+    out: Annotated[Path, option("MISSION", "Write the mission.")],
+    *,
+    link: dict[str, Any],
+) -> None:
+    """Download the mission, fence and rally points of a vehicle.
+
+    A fence or rally points that do not come are told, and the rest is written.
+
+    Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
+    arguments.
+    """
+    from faao_mav.autopilot import Vehicle
+    from faao_mav.autopilot.files import plan_target
+    from faao_mav.files import check_writable
+    from faao_mav.mission.formats import check_suffix
+    from faao_mav.wire.client import holdings
+
+    check_suffix(out)
+    check_writable(out)
+    with transfer_progress(shown=sys.stderr.isatty()) as observe:
+        held = holdings(source, observe=observe, **link)
+    found, mission = held.vehicle, held.mission
+    target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
+    written = write_noted(mission, out, target)
+    areas = len(mission.fence.polygons) + len(mission.fence.circles)
+    told = {"fence": f"{areas} fence areas", "rally points": f"{len(mission.rally)} rally points"}
+    told |= {part: f"{part} not read" for part in mission.unread}
+    typer.echo(f"vehicle      {found}")
+    typer.echo(f"mission      {len(mission.items)} items, {', '.join(told.values())}")
+    for path in written.contents:
+        typer.echo(f"written      {path}")
+    for problem in held.problems:
+        note(problem)
+    if held.problems:
+        raise typer.Exit(1)

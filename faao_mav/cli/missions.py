@@ -1,0 +1,227 @@
+"""`faao-mission validate` and `convert`: a mission file, judged, and in another format."""
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from faao_mav.cli.shared import (
+    Aircraft,
+    AsJson,
+    File,
+    Number,
+    PlanFile,
+    SolutionFile,
+    Whose,
+    check_known,
+    check_page,
+    exit_status,
+    flag,
+    option,
+    planned,
+    read_noted,
+    read_wind,
+    show,
+    write_noted,
+)
+from faao_mav.errors import InputError, printable
+from faao_mav.files import check_apart, check_writable, write_whole
+
+if TYPE_CHECKING:
+    from faao_mav.validate import Level, Rule
+    from faao_mav.validate.check import Check
+
+
+@exit_status()
+def validate(
+    mission_file: Annotated[
+        File, typer.Argument(metavar="MISSION", help="The mission: .waypoints or .plan.")
+    ] = None,
+    plan_file: PlanFile = None,
+    solution_file: SolutionFile = None,
+    autopilot: Whose = None,
+    kind: Aircraft = None,
+    parameters: Annotated[
+        File,
+        option(
+            "FILE.param",
+            "The vehicle's parameters; without: those of the file of parameters beside MISSION, "
+            "if there is one.",
+        ),
+    ] = None,
+    max_duration: Annotated[Number, option("S", "The longest flight, seconds.")] = None,
+    max_distance: Annotated[Number, option("M", "The farthest from home, metres.")] = None,
+    max_altitude: Annotated[Number, option("M", "The highest above home, metres.")] = None,
+    wind: Annotated[
+        str | None,
+        option(
+            "SPEED,FROM",
+            "The wind to predict the flight in, m/s and degrees clockwise from north that it comes "
+            "from; without: the plan's.",
+        ),
+    ] = None,
+    report: Annotated[File, option("PAGE.html", "One page with map and findings.")] = None,
+    strict: Annotated[bool, flag("--strict", "Warnings fail as well.")] = False,
+    as_json: AsJson = False,
+    rules: Annotated[bool, flag("--rules", "List the rules and stop.")] = False,
+) -> None:
+    """Check a mission before anyone walks to the field.
+
+    Says whether the autopilot will take it, whether the aircraft can fly it as it is written,
+    how near it comes to the fence, and with a plan what of its link the flight delivers, by its
+    prediction. Item numbers are those of the file's rows, where row 0
+    is home, and of QGroundControl.
+
+    Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
+    or a file that cannot be read.
+    """
+    from faao_mav.cli.vehicle import choose_vehicle
+    from faao_mav.validate import RULES, Level, Limits
+    from faao_mav.validate.check import check
+
+    if rules:
+        show(lambda: _rules_as_dict(RULES), lambda: _rule_lines(RULES), as_json=as_json)
+        return
+    if mission_file is None:
+        raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
+    check_known(autopilot, kind)
+    most = {"duration": max_duration, "distance": max_distance, "altitude": max_altitude}
+    for name, value in most.items():
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise InputError(f"--max-{name} {value:g}: expected a number above 0")
+    air = read_wind(wind)
+    check_page(report, {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file})
+    solution = planned(plan_file, solution_file)
+    plan = solution.plan if solution is not None else None
+    file = read_noted(mission_file)
+    vehicle, chosen_by = choose_vehicle(mission_file, file, plan, (autopilot, kind, parameters))
+    if vehicle.type.flight_model is not None:
+        vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
+    max_speed = plan.vehicle.max_speed if plan is not None else None
+    limits = Limits(max_duration, max_distance, max_altitude, max_speed)
+    found = check(file.mission, vehicle, limits=limits, solution=solution, wind=air)
+    if report is not None:
+        from faao_mav.report.page import render_report
+        from faao_mav.workflow import Result
+
+        about = Result(solution, check=found) if solution is not None else found
+        page = render_report(about, title=printable(mission_file.name))
+        write_whole(report, page.encode())
+    show(
+        lambda: {"mission": str(mission_file), **_as_dict(found)},
+        lambda: _lines(f"{mission_file}", chosen_by, found),
+        as_json=as_json,
+    )
+    if found.of(Level.ERROR) or (strict and found.of(Level.WARNING)):
+        raise typer.Exit(1)
+
+
+@exit_status()
+def convert(
+    mission_file: Annotated[
+        Path, typer.Argument(metavar="MISSION", help="The mission: .waypoints, .txt or .plan.")
+    ],
+    out: Annotated[Path, option("OTHER", "What to write: .waypoints, .txt, .plan or .kml.")],
+    autopilot: Whose = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a mission in another format, and say what that cannot hold.
+
+    The fence of a .waypoints or .txt file is a second file, M.fence.waypoints of M.waypoints.
+
+    Without --autopilot a .plan is for whom the mission that is read, or the parameters beside it,
+    say it is for.
+
+    Exit status: 0 done; 2 unusable arguments or input.
+    """
+    from faao_mav.autopilot import Vehicle, kind_by_number
+    from faao_mav.autopilot.files import plan_target
+    from faao_mav.cli.vehicle import told_vehicle
+    from faao_mav.mission.formats import check_readable, check_suffix
+
+    check_known(autopilot, None)
+    check_readable(mission_file)
+    check_suffix(out)
+    check_writable(out)
+    check_apart({"--out": out}, {"MISSION": mission_file})
+    read = read_noted(mission_file)
+    kind = kind_by_number(read.vehicle_type) or "copter"
+    told = told_vehicle(mission_file, read, None, None, (autopilot, None, None))
+    vehicle = Vehicle(autopilot, kind) if autopilot else told[0] if told is not None else None
+    written = write_noted(read.mission, out, plan_target(vehicle))
+    items, names = len(read.mission.items), " and ".join(map(str, written.contents))
+    show(
+        lambda: {"items": items, "lost": written.lost, "written": str(out)},
+        lambda: [f"{items} items written to {names}"],
+        as_json=as_json,
+    )
+
+
+_COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
+"""How a terminal shows each level of a finding."""
+
+
+def _as_dict(check: "Check") -> dict[str, Any]:
+    """Return the JSON object of `--json`; seconds, metres, bit/s/Hz."""
+    from faao_mav.validate import Level
+
+    vehicle, link = check.vehicle, check.link
+    predicted = None
+    if check.track is not None:
+        predicted = {"duration": float(check.track.t[-1]), "assumption": vehicle.assumption}
+    more = {} if link is None else {n: getattr(link, n) for n in ("share", "predicted_mbytes")}
+    return {
+        "items": len(check.mission.items),
+        "autopilot": vehicle.autopilot,
+        "type": vehicle.kind,
+        "parameters": vehicle.source if vehicle.parameters else None,
+        "predicted": predicted,
+        "link": asdict(link) | more if link is not None else None,
+        "energy": check.energy.as_dict() if check.energy else None,
+        **{f"{level}s": len(check.of(level)) for level in Level},
+        "findings": [asdict(finding) for finding in check.findings],
+    }
+
+
+def _lines(source: str, chosen_by: str, check: "Check") -> Iterator[str]:
+    """Yield what was found: one line a rule, and one of what to do."""
+    from faao_mav.report.summary import check_lines
+    from faao_mav.validate import Level
+    from faao_mav.validate.words import by_rule, count_of, said_of
+
+    vehicle = check.vehicle
+    yield (
+        f"{source}: {len(check.mission.items)} items, for "
+        f"{vehicle.type.family.name} and a {vehicle.kind} ({chosen_by}); "
+        f"parameters: {vehicle.source if vehicle.parameters else 'defaults'}"
+    )
+    for label, text in check_lines(check):
+        if label:  # what goes on without one stands in the findings too
+            yield f"{label}: {text}"
+    for group in by_rule(check.findings):
+        yield f"{_coloured(group[0].level)}: {said_of(group)}"
+        if group[0].action:
+            yield f"    to do: {group[0].action}"
+    yield ", ".join(count_of(check.findings, level) for level in Level)
+
+
+def _rules_as_dict(rules: "Sequence[Rule]") -> dict[str, Any]:
+    """Return the JSON object of `--rules --json`; null: every autopilot, every type."""
+    keys = {"id": "id", "level": "level", "autopilot": "autopilot", "type": "kind"}
+    keys |= {"summary": "summary", "source": "source"}
+    return {"rules": [{key: getattr(r, name) for key, name in keys.items()} for r in rules]}
+
+
+def _rule_lines(rules: "Sequence[Rule]") -> Iterator[str]:
+    """Yield a line a rule, its parts between tabs."""
+    for rule in rules:
+        whose = " ".join(filter(None, (rule.autopilot, rule.kind))) or "all"
+        yield "\t".join((_coloured(rule.level), rule.id, whose, rule.summary, rule.source))
+
+
+def _coloured(level: "Level") -> str:
+    return typer.style(str(level), fg=_COLOURS[str(level)]) if sys.stdout.isatty() else str(level)
