@@ -41,11 +41,7 @@ class GainLaw:
     )
     exponent: Number = key("Exponent n of the distance d.", "[0, 10]", default=2.0)
     elevation_db: tuple[Number, ...] = key(
-        "Terms c1, c2, c3 over s.",
-        "dB",
-        "at most three numbers [c1, c2, c3]",
-        max_length=3,
-        default=(),
+        "Terms over s.", "dB", "at most three numbers [c1, c2, c3]", max_length=3, default=()
     )
     spread_db: Number | None = key(
         "Standard deviation of shadowing about the law; null: unknown.", "(0, 30] dB", default=None
