@@ -61,8 +61,23 @@ PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("copter_relay", {"radio.modulation": "8psk", "antennas": 3}),
     ("copter_relay", {"radio.modulation": "16qam", "antennas": 3}),
     ("copter_relay", {"radio.modulation": "qpsk", "antennas": 4}),
+    ("copter_relay", {"radio.gain": {"elevation_db": [18, -30, 10]}}),
+    ("copter_relay", {"radio.gain": {"elevation_db": [0, -10, -30]}, "power": 10}),
+    (
+        "copter_relay",
+        {"radio.gain": {"exponent": 2.6, "elevation_db": [6]}, "power": 30, "flight.duration": 200},
+    ),
+    (
+        "copter_relay",
+        {
+            "radio.base_station.gain": {"elevation_db": [0, 0, -40]},
+            "radio.ground_user.gain": {"exponent": 2.4, "elevation_db": [-8, 12]},
+            "power": 30,
+        },
+    ),
     ("paper_active", {"flight.duration": 40}),
     ("paper_active", {"flight.duration": 50, "power": 10}),
+    ("paper_active", {"flight.duration": 50, "radio.gain": {"elevation_db": [0, -20, 10]}}),
     ("paper_active", {"flight.duration": 100, "power": 10}),
 )
 

@@ -129,11 +129,13 @@ def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     """The rate (1, n) at scaled positions w (2, n), c (k, n) in units of 1 / `gain`."""
     p, H = rate.link.station / LENGTH, rate.link.altitude / LENGTH
     away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
+    law, squared = rate.link.law, ca.sum1(away**2) + H**2
+    s = H / ca.sqrt(squared)
+    terms = sum(c * s**k for k, c in enumerate(law.elevation_db, 1)) * np.log(10) / 10
+    gain_log = terms - law.exponent / 2 * ca.log(squared * LENGTH**2)
     if isinstance(rate, Curve):
-        unit = np.log(rate.link.law.reference_gain / LENGTH**2)
-        return rate.value(unit - ca.log(ca.sum1(away**2) + H**2))
-    g = H**2 / (ca.sum1(away**2) + H**2)
-    D = ca.repmat(g, c.shape[0], 1) * c
+        return rate.value(gain_log + np.log(law.reference_gain))
+    D = ca.repmat(ca.exp(gain_log) * rate.link.altitude**2, c.shape[0], 1) * c
     total = rate.base + ca.mtimes(ca.DM(rate.multiplicity).T, ca.exp(-D))
     return rate.offset - rate.factor * ca.log(total) / np.log(2.0)
 
