@@ -113,9 +113,9 @@ class VerticalProfile:
     descent_speed: float
     acceleration: float
     landing_speed: float
-    landing_height: float
     return_height: float
     spool: float
+    landing_height: float = 10.0
     keeps_height: bool = True
     lands_on_return: bool = True
 

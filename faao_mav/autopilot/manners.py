@@ -3,11 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, Protocol, TypeAlias
-
-from numpy.typing import ArrayLike
-
-from faao_mav.arrays import Real
+from typing import Literal, NamedTuple, TypeAlias
 
 FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", "terminate"]
 """What a vehicle does that leaves its fence: flies on, says so and flies on, and so forth."""
@@ -53,16 +49,6 @@ class Manners:
     any_request_order: bool = False
     final_acks: int = 1
     meanings: Mapping[str, str] = field(default_factory=dict)
-
-
-class Frame(Protocol):
-    """East and north, m, of an origin on Earth: what `LocalFrame` does."""
-
-    def to_local(self, latitude: ArrayLike, longitude: ArrayLike) -> Real:
-        """Return positions (..., 2) in metres."""
-
-    def to_geodetic(self, positions: ArrayLike) -> tuple[Real, Real]:
-        """Return latitude and longitude in degrees."""
 
 
 _LEAST_TIMEOUT = 0.5

@@ -89,32 +89,26 @@ class Vehicle:
 
     def value(self, key: str) -> float:
         """Return the value of the parameter `key` in its table's unit: given, else the default."""
-        parameter = self.type.parameters[key]
-        name = parameter.name_in(self.parameters)
-        value = parameter.default
-        if name is not None:
-            number = self.parameters[name]
-            if not parameter.is_usable(number, name):
-                raise InputError(
-                    f"{self.source}: {name}: {number:g}; give {parameter.expected(name)}"
-                )
-            value = parameter.names[name] * number
-        if parameter.capped_by:
-            value = min(value, self.value(parameter.capped_by))
-        return value
+        return self._told(key)[0]
 
     def name_of(self, key: str) -> str:
         """Return the name by which `value(key)` is set, and that it is a default if it is."""
+        return self._told(key)[1]
+
+    def _told(self, key: str) -> tuple[float, str]:
+        """Return the value of a parameter, and what sets it."""
         parameter = self.type.parameters[key]
         name = parameter.name_in(self.parameters)
+        told = parameter.default, f"{parameter.newest_name}, its default"
+        if name is not None:
+            number = self.parameters[name]
+            if not parameter.is_usable(number, name):
+                expected = parameter.expected(name)
+                raise InputError(f"{self.source}: {name}: {number:g}; give {expected}")
+            told = parameter.names[name] * number, name
         if parameter.capped_by:
-            cap = self.type.parameters[parameter.capped_by]
-            own = (
-                parameter.default if name is None else parameter.names[name] * self.parameters[name]
-            )
-            if self.value(cap.key) < own:
-                return self.name_of(cap.key)
-        return name if name is not None else f"{parameter.newest_name}, its default"
+            told = min(told, self._told(parameter.capped_by), key=lambda each: each[0])
+        return told
 
     def having(self, key: str, value: float) -> "Vehicle":
         """Return the vehicle with another `value` of the parameter `key`, at least its least."""
@@ -136,8 +130,23 @@ class Vehicle:
 
     @property
     def vertical(self) -> VerticalProfile:
-        """How it takes off, climbs, returns and lands."""
-        return self.type.vertical(self)
+        """How it takes off, climbs, returns and lands, by its parameters."""
+
+        def told(key: str, otherwise: float) -> float:
+            return self.value(key) if key in self.type.parameters else otherwise
+
+        climb, height = self.value("climb_speed"), told("return_height", 0.0)
+        return VerticalProfile(
+            take_off_speed=told("take_off_speed", climb),
+            climb_speed=climb,
+            descent_speed=self.value("descent_speed"),
+            acceleration=told("climb_acceleration", 1.0),
+            landing_speed=told("landing_speed", 0.5),
+            return_height=height,
+            spool=self.type.spool,
+            keeps_height=self.type.returns_at_least or height < 0,
+            lands_on_return=self.type.hovers,
+        )
 
     def orbit(self, item: MissionItem) -> Orbit | None:
         """Return how it circles at `item`, None where it does not."""

@@ -9,8 +9,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body
 from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.failsafe import Failsafe
-from faao_mav.autopilot.flight_path import VerticalProfile
-from faao_mav.autopilot.manners import FenceAction, Frame, Manners, Modes, SetpointRules
+from faao_mav.autopilot.manners import FenceAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.model import Model
 from faao_mav.autopilot.orbit import Orbits, RallyRule, no_orbit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues
@@ -72,7 +71,7 @@ class AutopilotFamily:
     manners: Manners = field(default_factory=Manners)
     mode_parameters: Callable[[int], tuple[float, float, float]] = custom_mode
     setpoints: SetpointRules = field(default_factory=SetpointRules)
-    local_frame: Callable[[float, float], Frame] = LocalFrame
+    local_frame: Callable[[float, float], LocalFrame] = LocalFrame
     whole_as_bits: bool = False
     mavlink_2: str = ""
     only_one_station: str = ""
@@ -110,7 +109,8 @@ class VehicleType:
         parameters: its parameters by key.
         dialect: what it does with the items of a mission.
         fastest: the greatest speed that it can be told, m/s.
-        vertical: its take-off, climb, return and landing.
+        spool: how long a take-off takes before it climbs, s.
+        returns_at_least: a return never descends for the height of returns.
         fence_needs_one_inclusion: being inside one of several inclusion areas is enough; else the
             vehicle has to be inside all.
         home_outside_fence: what it does with a mission where home lies outside the fence.
@@ -139,7 +139,8 @@ class VehicleType:
     hovers: bool
     parameters: ParameterTable
     dialect: Dialect
-    vertical: Callable[[ParameterValues], VerticalProfile]
+    spool: float = 2.0
+    returns_at_least: bool = True
     whole_second_holds: bool = False
     fastest: float = 20.0
     fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True

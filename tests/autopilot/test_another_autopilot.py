@@ -22,7 +22,6 @@ from faao_mav.autopilot import (
 )
 from faao_mav.autopilot.dialect import ALL, Dialect, Limit, SpeedChange
 from faao_mav.autopilot.files import autopilot_of, parameter_path
-from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
 from faao_mav.autopilot.px4.flight_model import Px4
@@ -108,16 +107,6 @@ COPTER = VehicleType(
         frames={3: 3, 6: 3},
         idle_frames={2: 2},
         speed_change=lambda item: SpeedChange("horizontal", item.params[1]),
-    ),
-    vertical=lambda vehicle: VerticalProfile(
-        take_off_speed=vehicle.value("climb_speed"),
-        climb_speed=vehicle.value("climb_speed"),
-        descent_speed=vehicle.value("descent_speed"),
-        acceleration=2.0,
-        landing_speed=0.5,
-        landing_height=5.0,
-        return_height=vehicle.value("return_height"),
-        spool=1.0,
     ),
     flight_model=model,
     recommended=lambda speed, _: ({"TOY_SPEED": speed, "TOY_ACCEL": 5.0},),

@@ -12,13 +12,14 @@ from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule
 from faao_mav.autopilot.parameter import Parameter, ParameterValues
 from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse
+from faao_mav.geodesy import LocalFrame
 
 DEGREE = 111_318.84502145034
 """ArduPilot's degree of latitude, m; times the cosine of the latitude one of longitude."""
 
 
 @dataclass(frozen=True, slots=True)
-class FlatFrame:
+class FlatFrame(LocalFrame):
     """ArduPilot's flat Earth: degrees times a length, those of longitude shrunk by cos(latitude).
 
     The latitude is the mean of the position's and the origin's. Over 500 m that is up to 2 m from
@@ -28,9 +29,6 @@ class FlatFrame:
     >>> frame.to_local(-35.360107, 149.165237).round(2)
     array([  0.  , 351.21])
     """
-
-    latitude: float
-    longitude: float
 
     def to_local(self, latitude: ArrayLike, longitude: ArrayLike) -> Real:
         """Return positions (..., 2) in metres."""

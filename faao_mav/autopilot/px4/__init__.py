@@ -15,7 +15,6 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
-from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
@@ -155,26 +154,6 @@ _ERROR_LIMIT, _HEIGHT_RADIUS = 10.0, 3.0
 slows whenever the aircraft lags; with that of 0.8 m it missed waypoints for their altitude."""
 
 
-def _vertical(vehicle: ParameterValues) -> VerticalProfile:
-    return VerticalProfile(
-        take_off_speed=vehicle.value("take_off_speed"),
-        climb_speed=vehicle.value("climb_speed"),
-        descent_speed=vehicle.value("descent_speed"),
-        acceleration=vehicle.value("climb_acceleration"),
-        landing_speed=vehicle.value("landing_speed"),
-        landing_height=10.0,
-        return_height=vehicle.value("return_height"),
-        spool=2.0,
-    )
-
-
-def _plane_vertical(vehicle: ParameterValues) -> VerticalProfile:
-    """A return of a plane circles over home; what the rest would be is not known."""
-    climb = vehicle.value("climb_speed")
-    height = vehicle.value("return_height")
-    return VerticalProfile(climb, climb, climb, 1.0, climb, 0.0, height, 0.0, lands_on_return=False)
-
-
 def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
     speed = min(max_speed, _FASTEST)
     top = round(min(OVERSPEED * speed, _FASTEST), 2)
@@ -212,7 +191,6 @@ PX4_COPTER = VehicleType(
     hovers=True,
     parameters=COPTER_TABLE,
     dialect=DIALECT,
-    vertical=_vertical,
     home_outside_fence=_HOME_OUTSIDE_FENCE,
     at_fence=_at_fence,
     failsafes=FAILSAFES,
@@ -235,7 +213,6 @@ PX4_PLANE = VehicleType(
     hovers=False,
     parameters=PLANE_TABLE,
     dialect=DIALECT,
-    vertical=_plane_vertical,
     home_outside_fence=_HOME_OUTSIDE_FENCE,
     at_fence=_at_fence,
     failsafes=FAILSAFES,

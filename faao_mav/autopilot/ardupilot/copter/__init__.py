@@ -15,7 +15,6 @@ from faao_mav.autopilot.ardupilot.copter.parameters import TABLE
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
-from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
@@ -50,20 +49,6 @@ _MODES = Modes(
 )
 """COPTER_MODE of MAVLink. ArduCopter 4.7 does not arm in RTL, CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE,
 SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
-
-
-def _vertical(vehicle: ParameterValues) -> VerticalProfile:
-    climb = vehicle.value("climb_speed")
-    return VerticalProfile(
-        take_off_speed=climb,
-        climb_speed=climb,
-        descent_speed=vehicle.value("descent_speed"),
-        acceleration=vehicle.value("climb_acceleration"),
-        landing_speed=vehicle.value("landing_speed"),
-        landing_height=10.0,
-        return_height=vehicle.value("return_height"),
-        spool=3.5,  # measured: 100 m of take-off take 46 s
-    )
 
 
 def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
@@ -111,7 +96,7 @@ ARDUCOPTER = VehicleType(
     hovers=True,
     parameters=TABLE,
     dialect=COPTER_DIALECT,
-    vertical=_vertical,
+    spool=3.5,  # measured: 100 m of take-off take 46 s
     whole_second_holds=True,
     fastest=_FASTEST,
     fence_needs_one_inclusion=needs_one_inclusion,

@@ -14,32 +14,14 @@ from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.autopilot.body import ARDUPLANE_BODY
-from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
-from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
+from faao_mav.autopilot.parameter import Parameter, table
 from faao_mav.autopilot.vehicle_type import VehicleType
 
 _LOITER, _RTL = 12, 11
 _MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
 """PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL."""
-
-
-def _vertical(vehicle: ParameterValues) -> VerticalProfile:
-    """A return flies home at RTL_ALTITUDE and circles there (ArduPlane's RTL; RTL_AUTOLAND 0)."""
-    climb, height = vehicle.value("climb_speed"), vehicle.value("return_height")
-    return VerticalProfile(
-        take_off_speed=climb,
-        climb_speed=climb,
-        descent_speed=vehicle.value("descent_speed"),
-        acceleration=1.0,
-        landing_speed=0.5,
-        landing_height=10.0,
-        return_height=height,
-        spool=3.5,
-        keeps_height=height < 0,
-        lands_on_return=False,
-    )
 
 
 _TABLE = table(
@@ -66,7 +48,8 @@ ARDUPLANE = VehicleType(
     hovers=False,
     parameters=_TABLE,
     dialect=PLANE_DIALECT,
-    vertical=_vertical,
+    spool=3.5,
+    returns_at_least=False,
     fence_needs_one_inclusion=needs_one_inclusion,
     home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report"}),
