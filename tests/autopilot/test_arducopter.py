@@ -49,13 +49,16 @@ def test_measured_top_speed_by_lean_angle(degrees: float, top: float) -> None:
     assert np.hypot(*flown.velocity[:, :2].T).max() == pytest.approx(top, rel=0.05)
 
 
-@settings(max_examples=30)
+@settings(max_examples=40)
 @given(wandering(climbs=True), models)
 def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCopter) -> None:
+    path = replace(path, holds=np.append(path.holds[:-1], 15.0))
     flown = model.fly(path, 0.05)
     np.testing.assert_allclose(np.diff(flown.t), 0.05)
-    assert flown.t[0] == 0
+    assert flown.t[0] == flown.arrivals[0] == 0
     assert flown.t[-1] >= flown.departures[-1] - 1e-9
+    assert np.linalg.norm(flown.position[-1] - path.points[-1]) < 0.3
+    assert np.linalg.norm(flown.velocity[-1]) < 0.2
     middle = (flown.velocity[1:] + flown.velocity[:-1]) / 2
     assert np.diff(flown.position, axis=0) / 0.05 == pytest.approx(middle, abs=0.25)
     ground = np.hypot(*flown.velocity[:, :2].T)
@@ -65,34 +68,13 @@ def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCop
     # Where two legs overlap both move the target: their climbs never add up to more than both.
     assert flown.velocity[:, 2].max() <= 2 * model.climb_speed + 1e-9
     assert flown.velocity[:, 2].min() >= -2 * model.descent_speed - 1e-9
-
-
-@given(wandering(climbs=True))
-def test_it_comes_to_rest_at_the_last_point(path: FlightPath) -> None:
-    holds = np.append(path.holds[:-1], 15.0)
-    flown = ArduCopter().fly(replace(path, holds=holds))
-    assert np.linalg.norm(flown.position[-1] - path.points[-1]) < 0.3
-    assert np.linalg.norm(flown.velocity[-1]) < 0.2
-
-
-@given(wandering(climbs=True))
-def test_faster_is_never_much_later(path: FlightPath) -> None:
-    # Measured paths have corners at which a higher speed costs a little: none costs a second.
-    slow = ArduCopter().fly(path).arrivals[-1]
-    fast = ArduCopter().fly(replace(path, speeds=path.speeds * 1.2)).arrivals[-1]
-    assert fast < slow + 1.0
-
-
-def test_a_longer_straight_leg_takes_its_length_over_the_speed_longer() -> None:
-    ends = [ArduCopter().fly(line(length, 1, 6.0)).arrivals[-1] for length in (300, 900)]
-    assert ends[1] - ends[0] == pytest.approx(100, abs=0.02)
-
-
-@given(models, st.integers(1, 20))
-def test_a_leg_after_a_hold_takes_about_as_long_as_from_rest(model: ArduCopter, hold: int) -> None:
-    alone = ArduCopter.fly(model, path_of([0, 300])).arrivals[-1]
-    after = model.fly(path_of([-300j, 0, 300], holds={1: hold}))
-    assert after.arrivals[2] - after.departures[1] == pytest.approx(alone, abs=0.6)
+    waits = np.floor(path.holds)
+    np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
+    assert (flown.arrivals[1:] > flown.departures[:-1]).all()
+    for point, leaves, wait in zip(path.points, flown.departures, waits, strict=True):
+        if wait >= 10:
+            place = [np.interp(leaves, flown.t, x) for x in flown.position.T]
+            np.testing.assert_allclose(place, point, atol=0.5)
 
 
 def test_it_stops_only_where_it_holds() -> None:
@@ -126,22 +108,6 @@ def test_splines_pass_straight_legs_without_a_stop() -> None:
         assert abs(complex(*place) - point) < 3
 
 
-@settings(max_examples=30)
-@given(wandering(climbs=True), models)
-def test_arrivals_are_in_order_and_stops_are_at_their_points(
-    path: FlightPath, model: ArduCopter
-) -> None:
-    flown = model.fly(path, 0.05)
-    waits = np.floor(path.holds)
-    assert flown.arrivals[0] == 0
-    np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
-    assert (flown.arrivals[1:] > flown.departures[:-1]).all()
-    for point, leaves, wait in zip(path.points, flown.departures, waits, strict=True):
-        if wait >= 10:
-            place = [np.interp(leaves, flown.t, x) for x in flown.position.T]
-            np.testing.assert_allclose(place, point, atol=0.5)
-
-
 def test_holds_lose_their_fractions_and_delays_keep_them() -> None:
     path = path_of([0, 100, 100 + 100j], holds={1: 5.7})
     held = ArduCopter().fly(path)
@@ -151,20 +117,6 @@ def test_holds_lose_their_fractions_and_delays_keep_them() -> None:
     assert both.departures[1] - both.arrivals[1] == pytest.approx(5.7)
     only = ArduCopter().fly(replace(path, holds=np.zeros(3), delays=delays))
     assert only.departures[1] - only.arrivals[1] == pytest.approx(0.7)
-
-
-def test_the_rest_of_a_long_hold_is_only_waited() -> None:
-    short, long = (QUICK.fly(path_of([0, 60, 60 + 80j], holds={1: hold})) for hold in (25, 300))
-    shift = np.array([0.0, 0.0, 275.0])
-    np.testing.assert_allclose(long.arrivals - short.arrivals, shift, atol=1e-4)
-    waiting = (long.t > long.arrivals[1] + 20) & (long.t < long.departures[1])
-    np.testing.assert_allclose(long.position[waiting, :2], [[60, 0]] * waiting.sum(), atol=1e-3)
-
-
-def test_a_hold_of_less_than_a_second_is_none() -> None:
-    passing = ArduCopter().fly(line(60, 2))
-    holding = ArduCopter().fly(path_of([0, 60, 120], holds={1: 0.9}))
-    np.testing.assert_allclose(holding.arrivals, passing.arrivals)
 
 
 @pytest.mark.parametrize("model", [ArduCopter(), QUICK])
@@ -210,15 +162,6 @@ def test_one_point_is_only_held() -> None:
     np.testing.assert_array_equal(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
 
 
-def test_a_sharper_turn_takes_longer() -> None:
-    ends = [
-        ArduCopter().fly(path_of([0, 100, 100 + 100 * np.exp(1j * np.radians(turn))])).arrivals[2]
-        for turn in (0, 45, 90, 135, 180)
-    ]
-    assert ends == sorted(ends)
-    assert ends[-1] > ends[0] + 2
-
-
 def test_a_wider_radius_cuts_the_corner() -> None:
     nearest = []
     for radius in (1.0, 2.0, 5.0):
@@ -238,21 +181,6 @@ def test_splines_pass_their_points(path: FlightPath, model: ArduCopter) -> None:
     np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
     for point in path.points[:-1]:
         assert np.linalg.norm(flown.position - point, axis=1).min() < 3.0
-
-
-def test_limits_come_from_parameters_of_either_generation() -> None:
-    older = {"WPNAV_ACCEL": 400, "WPNAV_JERK": 10, "WPNAV_SPEED_UP": 300, "WPNAV_SPEED": 700}
-    newer = {"WP_ACC": 4, "WP_JERK": 10, "WP_SPD_UP": 3, "WP_SPD": 7}
-    expected = replace(QUICK, climb_speed=3, cruise_speed=7)
-    for parameters in (older, newer, {"WPNAV_ACCEL": 999, "WPNAV_SPEED": 1} | older | newer):
-        assert ArduCopter.from_vehicle(Vehicle(parameters=parameters)) == expected
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_useless_parameter_is_named(value: float) -> None:
-    vehicle = Vehicle("ardupilot", "copter", {"WPNAV_JERK": value}, "quad.param")
-    with pytest.raises(InputError, match=r"quad\.param: WPNAV_JERK: .*at least 0\.1"):
-        ArduCopter.from_vehicle(vehicle)
 
 
 def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:

@@ -9,7 +9,6 @@ from flight_paths import line, path_of, wandering
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane
 from faao_mav.autopilot.body import PlaneBody
 from faao_mav.autopilot.flight_path import FlightPath
@@ -122,26 +121,3 @@ def test_one_point_is_where_it_is() -> None:
     flown = PLANE.fly(path_of([3 + 4j]))
     assert flown.departures[0] == 0
     np.testing.assert_allclose(flown.position, [[3, 4, 30]])
-
-
-def test_limits_come_from_parameters_of_either_generation() -> None:
-    old = {"TRIM_ARSPD_CM": 1800, "LIM_ROLL_CD": 3000, "ARSPD_FBW_MAX": 25}
-    new = {"AIRSPEED_CRUISE": 18, "ROLL_LIMIT_DEG": 30, "AIRSPEED_MAX": 25}
-    for parameters in (old, new):
-        plane = ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", parameters))
-        assert plane.cruise_speed == 18
-        assert plane.roll_limit == pytest.approx(math.radians(30))
-        assert plane.max_speed == 25
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "least"),
-    [
-        ("TRIM_ARSPD_CM", 50, "100"),
-        ("WP_RADIUS", 0, "1"),
-        ("LIM_ROLL_CD", 9, "500"),
-    ],
-)
-def test_a_useless_parameter_is_named(name: str, value: float, least: str) -> None:
-    with pytest.raises(InputError, match=rf"plane\.parm: {name}: {value}; .*at least {least}"):
-        ArduPlane.from_vehicle(Vehicle("ardupilot", "plane", {name: value}, "plane.parm"))

@@ -9,46 +9,37 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.flight_path import FlightPath
 from faao_mav.autopilot.px4 import Px4
 from faao_mav.autopilot.px4.flight_model import SWITCH_DELAY
-from faao_mav.errors import InputError
 
 SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
 
 models = st.sampled_from([Px4(), SUITED])
 
 
-@settings(max_examples=10)
+@settings(max_examples=15)
 @given(wandering(climbs=True), models)
 def test_motion_is_continuous_and_within_limits(path: FlightPath, model: Px4) -> None:
-    flown = model.fly(path, 0.1)
+    flown = model.fly(path, 0.05)
     speed = np.linalg.norm(flown.velocity[:, :2], axis=1)
-    limit = path.speeds.max()
-    assert speed.max() <= 1.25 * limit + 0.5
+    assert speed.max() <= 1.25 * path.speeds.max() + 0.5
     assert -1.6 * model.descent_speed <= flown.velocity[:, 2].min()
     assert flown.velocity[:, 2].max() <= 1.3 * model.climb_speed
-    moved = np.diff(flown.position, axis=0)
     mean = (flown.velocity[1:] + flown.velocity[:-1]) / 2
-    np.testing.assert_allclose(moved, mean * 0.1, atol=0.02)
+    np.testing.assert_allclose(np.diff(flown.position, axis=0), mean * 0.05, atol=0.02)
     # Each axis has its own limit, and the controller adds to what the trajectory asks for.
-    change = np.abs(np.diff(flown.velocity[:, :2], axis=0)) / 0.1
+    change = np.abs(np.diff(flown.velocity[:, :2], axis=0)) / 0.05
     assert change.max() <= 1.5 * model.acceleration + 0.5
-
-
-@settings(max_examples=10)
-@given(wandering(climbs=True), models)
-def test_arrivals_are_in_order_and_within_the_radius(path: FlightPath, model: Px4) -> None:
-    flown = model.fly(path, 0.02)
     assert flown.arrivals[0] == 0
-    assert (flown.departures >= flown.arrivals + path.holds).all()
+    waits = path.holds + SWITCH_DELAY * ((path.holds > 0) | (np.arange(len(path.holds)) > 0))
+    np.testing.assert_allclose(flown.departures - flown.arrivals, waits, atol=1e-9)
     assert (flown.arrivals[1:] >= flown.departures[:-1]).all()
-    assert flown.t[-1] >= flown.departures[-1] > flown.t[-1] - 0.02 - 1e-9
+    assert flown.t[-1] >= flown.departures[-1] > flown.t[-1] - 0.05 - 1e-9
     for point, arrival in zip(path.points, flown.arrivals, strict=True):
         place = [np.interp(arrival, flown.t, x) for x in flown.position.T]
-        assert np.hypot(*(place - point)[:2]) <= model.acceptance_radius + 0.02
-        assert abs(place[2] - point[2]) <= model.height_radius + 0.02
+        assert np.hypot(*(place - point)[:2]) <= model.acceptance_radius + 0.05
+        assert abs(place[2] - point[2]) <= model.height_radius + 0.05
 
 
 @settings(max_examples=10)
@@ -105,26 +96,10 @@ def test_long_legs_are_flown_at_one_speed(model: Px4) -> None:
     np.testing.assert_allclose(moved, mean * 0.1, atol=0.01)
 
 
-def test_fractions_of_holds_count() -> None:
-    path = path_of([0, 60, 60 + 60j])
-    holds = np.zeros((4, 3))
-    holds[:, 1] = [0.4, 5.0, 5.3, 12.5]
-    many = [Px4().fly(replace(path, holds=each)) for each in holds]
-    waited = [flown.departures[1] - flown.arrivals[1] for flown in many]
-    np.testing.assert_allclose(waited, holds[:, 1] + SWITCH_DELAY, atol=1e-9)
-
-
 def test_any_hold_makes_it_brake() -> None:
     passing = Px4().fly(line(60, 2))
     holding = Px4().fly(path_of([0, 60, 120], holds={1: 0.4}))
     assert holding.arrivals[2] > passing.arrivals[2] + 3
-
-
-def test_a_long_hold_ends_over_the_point() -> None:
-    flown = Px4().fly(path_of([0, 60, 60 + 60j], holds={0: 30.0, 1: 300.0}))
-    assert flown.departures[0] == pytest.approx(30 + SWITCH_DELAY)
-    waiting = (flown.t > flown.arrivals[1] + 20) & (flown.t < flown.departures[1])
-    np.testing.assert_allclose(flown.position[waiting, 0], 60, atol=0.1)
 
 
 def test_a_radius_as_long_as_its_leg_counts_at_once() -> None:
@@ -162,37 +137,7 @@ def test_climbs_at_its_own_speed() -> None:
     assert (middle[2] - 30) / 60 == pytest.approx(middle[0] / 40, abs=0.05)
 
 
-def test_a_vertical_leg() -> None:
-    flown = Px4().fly(path_of([0, 0, 50], heights=[10, 40, 40]))
-    assert flown.arrivals[1] == pytest.approx(30 / 3, abs=4)
-    assert abs(flown.position[flown.t < flown.arrivals[1], 0]).max() < 0.01
-
-
 def test_one_point_is_only_held() -> None:
     flown = Px4().fly(path_of([3 + 4j], holds={0: 2.5}))
     assert flown.departures[0] == pytest.approx(2.5 + SWITCH_DELAY)
     np.testing.assert_array_equal(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
-
-
-def test_tighter_following_keeps_time() -> None:
-    """With MPC_XY_ERR_MAX 10 a lag holds up the trajectory's clock less than with 2."""
-    path = line(40, 5, 8.0)
-    assert Px4(error_limit=10).fly(path).arrivals[-1] < Px4().fly(path).arrivals[-1]
-
-
-def test_limits_come_from_parameters() -> None:
-    vehicle = Vehicle(
-        "px4", "copter", {"MPC_ACC_HOR": 5, "MPC_Z_VEL_MAX_UP": 2, "MPC_Z_V_AUTO_DN": 1, "X": 9}
-    )
-    assert Px4.from_vehicle(vehicle) == Px4(acceleration=5, climb_speed=2, descent_speed=1)
-    both = Vehicle("px4", "copter", {"MPC_Z_VEL_MAX_UP": 2, "MPC_Z_V_AUTO_UP": 4})
-    assert Px4.from_vehicle(both).climb_speed == 2
-    high = Vehicle("px4", "copter", {"MPC_Z_VEL_MAX_UP": 6})
-    assert Px4.from_vehicle(high).climb_speed == 3  # PX4 climbs at MPC_Z_V_AUTO_UP in missions
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_useless_parameter_is_named(value: float) -> None:
-    vehicle = Vehicle("px4", "copter", {"MPC_JERK_AUTO": value}, "quad.params")
-    with pytest.raises(InputError, match=r"quad\.params: MPC_JERK_AUTO: .*at least 0\.1"):
-        Px4.from_vehicle(vehicle)
