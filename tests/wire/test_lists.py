@@ -19,7 +19,6 @@ from faao_mav.wire.messages import (
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
-    Statustext,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.questions import Pace, Questions, Timeouts
@@ -103,22 +102,6 @@ def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
     for seq in range(3):
         desk.tell(request(seq))
         assert desk.wait(8.0) == []
-
-
-def test_a_refusal_is_final_at_any_moment() -> None:
-    ends = {MavResult.ACCEPTED, MavResult.INVALID_SEQUENCE, MavResult.OPERATION_CANCELLED}
-    for firmware in FAMILIES:
-        for result in sorted({*MavResult} - ends - TENTATIVE):
-            for requests in (0, 1, 3):
-                desk = uploading(firmware, asked=requests)
-                desk.tell(ack(result))
-                desk.tell(Statustext(4, "because"))
-                assert desk.tell(request(0)) == []
-                desk.wait(2.0)
-                outcome = desk.machine.outcome
-                assert (outcome.status, outcome.result) == ("refused", result)
-                assert outcome.said == ("because",)
-                assert outcome.last_requested == (requests - 1 if requests else None)
 
 
 def test_what_may_be_about_a_late_packet_is_final_when_nothing_more_is_asked_for() -> None:
