@@ -1,7 +1,8 @@
 """Missions, peers and short ways to run machines for the tests of the wire."""
 
 import hashlib
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -125,6 +126,33 @@ def mock_of(kind: str | Behaviour, **options: Any) -> MockAutopilot:
     """Return a mock autopilot that sends no position reports."""
     behaviour = kind if isinstance(kind, Behaviour) else behaviour_of(cast(MockKind, kind))
     return MockAutopilot(behaviour, home=HOME, rate=0.0, **options)
+
+
+@dataclass
+class Air:
+    """A transport without sockets: `says` returns what is heard, and from where, of what is sent.
+
+    Before something is sent, and where nothing is said for a while, that is of None.
+    """
+
+    says: Callable[[bytes | None], list[tuple[bytes, str]]]
+    listens: bool = True
+    sent: list[tuple[bytes, str | None]] = field(default_factory=list)
+    waiting: list[tuple[bytes, str]] = field(default_factory=list)
+
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        self.waiting = self.waiting or self.says(None)
+        if not self.waiting:
+            time.sleep(min(max(timeout, 0.0), 0.02))
+        arrived, self.waiting = self.waiting, []
+        return arrived
+
+    def write(self, data: bytes, to: str | None = None) -> None:
+        self.sent.append((data, to))
+        self.waiting += self.says(data)
+
+    def close(self) -> None:
+        pass
 
 
 @dataclass

@@ -12,7 +12,7 @@ import pytest
 from conftest import PATIENCE, free_port
 from mock_flights import fly
 from served import running
-from stations import FENCE, HOME, VEHICLE, a_mission, mock_of, rows_for, vehicle_of
+from stations import FENCE, HOME, VEHICLE, Air, a_mission, mock_of, rows_for, vehicle_of
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -303,27 +303,19 @@ def test_a_link_that_breaks_in_an_upload_says_what_is_left(
 ) -> None:
     mock = mock_of("ardupilot")
     theirs = Codec(VEHICLE)
-    waiting = [theirs.pack(message) for message in mock.start(0.0)]
+    waiting = [(theirs.pack(message), "") for message in mock.start(0.0)]
 
-    class Breaking:
-        listens = False
+    def says(data: bytes | None) -> list[tuple[bytes, str]]:
+        answers = list[Message]()
+        for packet in theirs.parse(data or b""):
+            assert packet.envelope is not None
+            if isinstance(packet.envelope.message, MissionItemInt):
+                raise LinkError("/dev/ttyACM0: the device is gone")
+            answers += mock.on(packet.envelope, 1.0)
+        return [(theirs.pack(answer), "") for answer in answers]
 
-        def read(self, _: float) -> list[tuple[bytes, str]]:
-            found = [(packet, "") for packet in waiting]
-            waiting.clear()
-            return found
-
-        def write(self, data: bytes, _: str | None = None) -> None:
-            for packet in theirs.parse(data):
-                assert packet.envelope is not None
-                if isinstance(packet.envelope.message, MissionItemInt):
-                    raise LinkError("/dev/ttyACM0: the device is gone")
-                waiting.extend(map(theirs.pack, mock.on(packet.envelope, 1.0)))
-
-        def close(self) -> None:
-            pass
-
-    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Breaking())
+    air = Air(says, listens=False, waiting=waiting)
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
     with pytest.raises(
         LinkError, match=r"is gone, while uploading mission at item 1 of 6\. ArduPilot may now hold"
     ):
