@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
-import numpy as np
 import pytest
 from mock_flights import fly
 from stations import HOME, VEHICLE, Desk, a_mission, vehicle_of
@@ -22,7 +21,6 @@ from faao_mav.wire.messages import (
     GlobalPositionInt,
     Heartbeat,
     HomePosition,
-    LocalPositionNed,
     Message,
     MissionClearAll,
     MissionCurrent,
@@ -119,21 +117,6 @@ def test_a_plane_has_its_own_number_and_modes() -> None:
     assert result(desk.tell(SetMode(1, 1, 10))) == 0
     assert height(desk, 2.0) > 0
     assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
-
-
-def test_positions_are_those_of_the_track() -> None:
-    mission = a_mission(12)
-    desk = desk_for("px4", mission)
-    take_off(desk, "px4")
-    desk.wait(5.0)
-    track = fly(mission)
-    (place,) = only(desk.wait(0.3), GlobalPositionInt)
-    (local,) = only(desk.sent[-4:], LocalPositionNed)
-    up = np.interp(place.time_boot_ms / 1000, track.t, track.position[:, 2])
-    assert place.relative_alt / 1000 == pytest.approx(up, abs=0.01)
-    assert place.alt - place.relative_alt == 584_000
-    assert local.z == pytest.approx(-place.relative_alt / 1000, abs=1e-3)
-    assert (local.vz < 0) == (place.vz < 0)
 
 
 def test_a_waypoint_before_a_do_item_is_told_by_the_do_items_number() -> None:

@@ -9,12 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stations import FOREIGN, VEHICLE, Desk, peer_of, rows_for
 
-from faao_mav.errors import InputError
 from faao_mav.wire.machine import Line, Script
 from faao_mav.wire.messages import (
     Heartbeat,
     MissionAck,
-    MissionClearAll,
     MissionCount,
     MissionItemInt,
     MissionRequestInt,
@@ -22,7 +20,7 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.questions import Pace, Questions, Timeouts
-from faao_mav.wire.transfer.exchange import TENTATIVE, clear, download, upload
+from faao_mav.wire.transfer.exchange import clear, download, upload
 
 ME = GROUND_STATION
 ROWS = rows_for("px4", 9)
@@ -58,22 +56,6 @@ def seqs(messages: Sequence[Any]) -> list[int]:
     return [message.seq for message in messages]
 
 
-def test_a_whole_upload_of_each_list() -> None:
-    for part in MissionType:
-        desk = uploading("px4", part=part)
-        assert desk.sent == [MissionCount(VEHICLE, part, 3)]
-        for seq in range(3):
-            assert desk.machine.progress == (f"uploading {part.title}", seq, 3)
-            told = request(seq, part=part, legacy=seq == 1)
-            assert desk.tell(told) == [MissionItemInt(VEHICLE, part, seq, ROWS[seq])]
-        desk.tell(ack(MavResult.ACCEPTED, part=part, number=77))
-        assert (desk.machine.outcome.status, desk.machine.outcome.opaque_id) == ("accepted", 77)
-        assert desk.machine.deadline is None
-    desk = Desk(Script(upload((), peer_of("px4"))))
-    with pytest.raises(InputError, match="clear the list instead"):
-        desk.start()
-
-
 def test_any_row_is_sent_as_often_as_asked_for_in_any_order() -> None:
     for firmware in FAMILIES:
         desk = uploading(firmware)
@@ -102,41 +84,6 @@ def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
     for seq in range(3):
         desk.tell(request(seq))
         assert desk.wait(8.0) == []
-
-
-def test_what_may_be_about_a_late_packet_is_final_when_nothing_more_is_asked_for() -> None:
-    for result in TENTATIVE:
-        desk = uploading("ardupilot", asked=1)
-        desk.tell(ack(result))
-        assert seqs(desk.tell(request(1))) == [1]
-        desk.tell(ack(result))
-        desk.wait(1.6)
-        assert (desk.machine.outcome.status, desk.machine.outcome.result) == ("refused", result)
-
-
-def test_a_busy_px4_is_asked_again_until_it_is_free() -> None:
-    desk = uploading("px4")
-    for _ in range(3):
-        desk.tell(ack(MavResult.ERROR))
-        assert MissionCount(VEHICLE, 0, 3) in desk.wait(1.5)
-    assert seqs(desk.tell(request(0))) == [0]
-
-
-def test_a_reboot_in_the_middle_begins_anew_when_the_vehicle_is_ready() -> None:
-    """A real ArduCopter, 50 ms after its power was cut: UNSUPPORTED, and CALIBRATING later."""
-    for result in (MavResult.UNSUPPORTED, MavResult.NO_SPACE):
-        desk = uploading("ardupilot", asked=1)
-        desk.tell(ack(result))
-        assert desk.wait(1.0) == []
-        for _ in range(2):
-            desk.tell(BOOTING)
-            desk.tell(ack(result))
-            assert desk.wait(10.0) == []
-        assert desk.tell(READY) == [MissionCount(VEHICLE, 0, 3)]
-        for seq in range(3):
-            assert seqs(desk.tell(request(seq))) == [seq]
-        desk.tell(ack(MavResult.ACCEPTED))
-        assert desk.machine.outcome.status == "accepted"
 
 
 @pytest.mark.parametrize("beats", [(), (READY,), (BOOTING,), (BOOTING, READY)])
@@ -258,18 +205,6 @@ def test_unsupported_changes_to_the_old_request() -> None:
     assert desk.machine.outcome.result == MavResult.UNSUPPORTED
 
 
-def test_what_may_be_about_an_upload_before_ends_no_download() -> None:
-    for result in (*TENTATIVE, MavResult.INVALID_SEQUENCE):
-        desk = Desk(Script(download(peer_of("ardupilot"))))
-        desk.start()
-        desk.tell(ack(result))
-        desk.tell(MissionCount(ME, 0, 3))
-        for seq in range(3):
-            assert desk.tell(ack(result)) == []
-            desk.tell(item(seq))
-        assert desk.machine.outcome.status == "accepted"
-
-
 def test_a_download_that_is_always_ended_is_begun_anew_a_few_times() -> None:
     """As when a late request has ended it: PX4 says ERROR, and nothing more."""
     desk = reading("px4")
@@ -285,17 +220,6 @@ def test_a_download_that_is_always_ended_is_begun_anew_a_few_times() -> None:
         MavResult.ERROR,
     )
     assert desk.sent.count(MissionRequestList(VEHICLE, 0)) >= Timeouts().attempts
-
-
-def test_clearing() -> None:
-    for result, status in ((MavResult.ACCEPTED, "accepted"), (MavResult.DENIED, "refused")):
-        desk = Desk(Script(clear(peer_of("ardupilot"), MissionType.FENCE)))
-        assert desk.start() == [MissionClearAll(VEHICLE, 1)]
-        desk.tell(ack(MavResult.ACCEPTED))
-        desk.tell(ack(MavResult.ERROR, part=1))
-        assert {*desk.wait(3.0)} == {MissionClearAll(VEHICLE, 1)}
-        desk.tell(ack(result, part=1))
-        assert desk.machine.outcome.status == status
 
 
 @settings(max_examples=100)
