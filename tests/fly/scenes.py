@@ -1,18 +1,27 @@
 """A mock autopilot and a watch of it, on a simulated link."""
 
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import cache
 from typing import Any, cast
 
+import numpy as np
+from conftest import FLYABLE, edited
 from mock_flights import fly
 from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
 
+from faao_mav import optimize, parse_plan
+from faao_mav.arrays import Real
+from faao_mav.fly.gate import LEVEL, NEAR
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, Held
 from faao_mav.fly.start import Start
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.watch import Watch
-from faao_mav.mission import Mission
+from faao_mav.geodesy import LocalFrame
+from faao_mav.mission import Home, Mission
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
@@ -28,6 +37,7 @@ from faao_mav.wire.messages import (
     MissionRequestList,
     ParamRequestRead,
     SetMode,
+    SetPositionTargetLocalNed,
     Timesync,
 )
 from faao_mav.wire.parameters import Reading
@@ -43,6 +53,70 @@ from faao_mav.wire.wire_items import wire_items
 METRE = 1e7 / 111_319.5
 """A metre of latitude in 1e-7 degrees."""
 
+LOITER = 5
+"""A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
+LAND = 4 << 16 | 6 << 24
+"""PX4's."""
+HOLD = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
+
+LOW: dict[str, Any] = {
+    "flight.start_velocity": "hover",
+    "flight.end_velocity": "hover",
+    "flight.altitude": 6,
+    "flight.duration": 16,
+    "vehicle.max_speed": 6,
+    "vehicle.max_acceleration": 2.5,
+    "mission.on_finish": "land",
+}
+
+SWIFT: dict[str, Any] = {
+    "flight.start_velocity": "hover",
+    "flight.end_velocity": "hover",
+    "flight.start": [0, 50],
+    "flight.end": [200, 0],
+    "flight.altitude": 30,
+    "flight.duration": 32,
+    "vehicle.max_speed": 8,
+    "vehicle.max_acceleration": 1.6,
+    "radio.ground_user.position": [220, 60],
+    "mission.on_finish": "land",
+}
+"""A plan that never waits: 8 m/s for most of 206 m, 30 m above the ground."""
+
+ZONE = {
+    "margin": 3,
+    "inclusion": [[-40, -60], [260, -60], [260, 120], [-40, 120]],
+    "exclusion": [{"polygon": [[80, -10], [120, -10], [120, 40], [80, 40]]}],
+}
+"""A fence with a zone across the straight of that flight."""
+
+CAP = NEAR + 8**2 / (2 * 1.6)
+"""The farthest, m, that the gate lets that flight be sent."""
+
+
+@cache
+def low() -> Solution:
+    """Return the small plan solved: 16 s at up to 6 m/s, 6 m above home."""
+    return optimize(parse_plan(edited(FLYABLE, LOW)))
+
+
+def under(changes: dict[str, Any]) -> Solution:
+    """Return the same flight for a plan that has what does not change it otherwise."""
+    return replace(low(), problem=build_problem(parse_plan(edited(FLYABLE, LOW | changes))))
+
+
+@cache
+def swift(*, fenced: bool = False) -> Solution:
+    changes = SWIFT | ({"fence": ZONE, "flight.duration": 36} if fenced else {})
+    return optimize(parse_plan(edited(FLYABLE, changes)))
+
+
+def away(metres: float, higher: float = 0.0) -> Home:
+    """Return a place so many metres east of home."""
+    frame = LocalFrame(HOME.latitude, HOME.longitude)
+    latitude, longitude = frame.to_geodetic([metres, 0.0])
+    return Home(float(latitude), float(longitude), HOME.altitude + higher)
+
 
 def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
     """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
@@ -55,7 +129,9 @@ def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
 class Scene:
     """A mock autopilot that holds a mission, and a watch of it on a simulated link.
 
-    `flight` is what is asked for beside that mission, for which the mock may not be ready.
+    `flight` is what is asked for beside that mission, for which the mock may not be ready. With a
+    `solution` it is flown by setpoints: `times`, s, are when the flying mock was sent one, `sent`
+    where to and `places` where it was, m.
     """
 
     def __init__(
@@ -87,6 +163,50 @@ class Scene:
         if solution is not None:
             self.watch = Stream(peer, solution, ready)
         self.client = Counted(self.watch)
+        self.solution = solution
+        self.times, self.sent, self.places = list[float](), list[Real](), list[Real]()
+        self._record()
+
+    def _record(self) -> None:
+        hear = self.mock.flight.hear
+
+        def heard(message: SetPositionTargetLocalNed, now: float) -> bool:
+            flight = self.mock.flight
+            if flight.armed:
+                self.times.append(now)
+                self.sent.append(flight.aim(message)[0])
+                self.places.append(flight.aircraft.at(now).position)
+            return bool(hear(message, now))
+
+        self.mock.flight.hear = heard
+
+    @property
+    def off(self) -> Real:
+        """How far it was sent each time, (k, 3) m."""
+        return np.array(self.sent) - np.array(self.places)
+
+    def assert_gated(self, lag: float = 0.0) -> None:
+        """Check that it was never sent farther than the gate lets it, and within its fence.
+
+        `lag` is how far it flies, m, while a position and its answer are on the link.
+        """
+        assert self.solution is not None
+        across, area = np.hypot(*self.off[:, :2].T), self.solution.plan.keep_in
+        assert across.max() <= CAP + lag
+        assert np.abs(self.off[:, 2]).max() <= LEVEL + 2.0 + lag
+        for place, to, far in zip(self.places, self.sent, across, strict=True):
+            if area is not None and far > NEAR + lag:
+                assert area.covers_path(np.array([place[:2], to[:2]]))
+
+    def assert_arrived(self) -> None:
+        """Check that it has flown to the end of its plan."""
+        assert self.solution is not None
+        last = self.watch.seen.record().line(self.solution).w[-1]
+        assert np.linalg.norm(last - self.solution.w[-1]) < 1.0
+
+    def after(self, begin: float, end: float = float("inf")) -> int:
+        """Return how many setpoints it was sent after `begin`, s, and before `end`."""
+        return sum(begin < each < end for each in self.times)
 
     def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:
         """Return the kind of the ending, "" for none."""
@@ -158,6 +278,10 @@ def during(
         return [message]
 
     return lens
+
+
+def is_setpoint(message: object) -> bool:
+    return isinstance(message, SetPositionTargetLocalNed)
 
 
 def arms(message: object, wanted: float | None = None) -> bool:

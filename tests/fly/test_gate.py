@@ -1,7 +1,6 @@
 """The gate of all setpoints, and the ways on which an aircraft is led back through it."""
 
 from collections.abc import Callable
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 from conftest import FLYABLE, edited
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from scenes import CAP, SWIFT, ZONE, swift
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
@@ -19,35 +19,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.transit import way_between
 
-SWIFT: dict[str, Any] = {
-    "flight.start_velocity": "hover",
-    "flight.end_velocity": "hover",
-    "flight.start": [0, 50],
-    "flight.end": [200, 0],
-    "flight.altitude": 30,
-    "flight.duration": 32,
-    "vehicle.max_speed": 8,
-    "vehicle.max_acceleration": 1.6,
-    "radio.ground_user.position": [220, 60],
-    "mission.on_finish": "land",
-}
-"""A plan that never waits: 8 m/s for most of 206 m, 30 m above the ground."""
-
-ZONE = {
-    "margin": 3,
-    "inclusion": [[-40, -60], [260, -60], [260, 120], [-40, 120]],
-    "exclusion": [{"polygon": [[80, -10], [120, -10], [120, 40], [80, 40]]}],
-}
-"""A fence with a zone across the straight of that flight."""
-
-CAP = NEAR + 8**2 / (2 * 1.6)
 PLACES = st.tuples(st.floats(-60, 60), st.floats(-60, 60), st.floats(-40, 40)).map(np.array)
-
-
-@cache
-def swift(*, fenced: bool = False) -> Solution:
-    changes = SWIFT | ({"fence": ZONE, "flight.duration": 36} if fenced else {})
-    return optimize(parse_plan(edited(FLYABLE, changes)))
 
 
 def plan_with(changes: dict[str, Any]) -> Plan:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from conftest import FLYABLE, edited
-from scenes import Scene, held_by
+from scenes import Scene, away, held_by
 from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, vehicle_of
 
 from faao_mav import parse_plan, plan_mission
@@ -17,14 +17,12 @@ from faao_mav.autopilot.px4 import px4_mode
 from faao_mav.fly.preflight import LEAST_BATTERY, preflight
 from faao_mav.fly.seen import Flight, Held
 from faao_mav.fly.telemetry import Telemetry
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot
-from faao_mav.sim.faults import Faults
 from faao_mav.validate import Finding, Level
 from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
+from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.transfer.exchange import Outcome
 from faao_mav.wire.wire_items import wire_items
 from faao_mav.workflow import Result
@@ -34,13 +32,6 @@ ANYWHERE = Fence(circles=(Circle((HOME.latitude, HOME.longitude), 5000.0, inclus
 
 
 FENCED = {"FENCE_ENABLE": 1, "FENCE_TYPE": 4}
-
-
-def away(metres: float, higher: float = 0.0) -> Home:
-    """Return a place so many metres east of home."""
-    frame = LocalFrame(HOME.latitude, HOME.longitude)
-    latitude, longitude = frame.to_geodetic([metres, 0.0])
-    return Home(float(latitude), float(longitude), HOME.altitude + higher)
 
 
 def holding(
@@ -312,38 +303,6 @@ def test_what_it_does_on_a_loss_or_at_its_fence_is_told() -> None:
 
 
 @KINDS
-def test_nothing_is_armed_at_another_place(kind: str) -> None:
-    for place in (away(1_500.0), away(0.0, -32.0)):
-        scene = Scene(kind, arm=True, home=place)
-        assert scene.run() == "refused"
-        assert scene.orders == []
-        assert "the mission's home" in scene.watch.outcome.text
-        assert "--elsewhere" in scene.watch.outcome.text
-    scene = Scene(kind, arm=True, home=away(150.0), elsewhere=True)
-    assert scene.run() == "finished"
-    (told,) = [each for each in scene.watch.findings if each.rule == "place-home"]
-    assert told.action == "--elsewhere: flown all the same"
-
-
-def test_without_arm_the_same_is_told_and_the_watch_goes_on() -> None:
-    scene = Scene("ardupilot", home=away(1_500.0))
-    events = [(8.0, scene.does(MavCommand.ARM, 1)), (9.0, scene.does(MavCommand.START))]
-    assert scene.run(events=events, until=900.0) == "finished"
-    assert "place-home" in {each.rule for each in scene.watch.findings}
-    assert scene.orders == []
-
-
-def test_where_it_stands_is_looked_at_again_when_it_is_armed() -> None:
-    scene = Scene("ardupilot", arm=True)
-
-    def carry(_: float) -> None:
-        scene.mock.home = away(60.0)
-
-    assert scene.run(events=[(1.5, carry)]) == "refused"
-    assert scene.orders == []
-
-
-@KINDS
 def test_a_parameter_that_is_changed_before_it_is_armed_counts(kind: str) -> None:
     name, value = {"ardupilot": ("WPNAV_ACCEL", 250.0), "px4": ("MPC_ACC_HOR", 3.0)}[kind]
     flight = Flight(a_mission(12), Vehicle(kind, "copter", {name: value}))
@@ -359,31 +318,6 @@ def test_a_parameter_that_is_changed_before_it_is_armed_counts(kind: str) -> Non
     assert Scene(kind, flight=flight, arm=True, parameters={name: 2 * value}).run() == "refused"
     untimed = Scene(kind, flight=flight, arm=True, parameters={name: 2 * value}, untimed=True)
     assert untimed.run() == "finished"
-
-
-@KINDS
-@pytest.mark.parametrize("loss", [0.0, 0.1])
-def test_what_was_read_long_before_is_read_again(kind: str, loss: float) -> None:
-    for leftover, ending in ((False, "finished"), (True, "refused")):
-        scene = Scene(kind, arm=True, boot=20.0)
-        rows = wire_items(a_mission(5, rally=RALLY), MissionType.RALLY, vehicle_of(kind))
-
-        def leave(_: float, scene: Scene = scene, rows: Any = rows) -> None:
-            scene.mock.lists.replace(MissionType.RALLY, rows)
-
-        events = [(10.0, leave)] if leftover else []
-        assert scene.run(Faults(loss=loss, seed=2), events=events) == ending
-        assert ((400, 1.0) in scene.commands) == (not leftover)
-
-
-def test_an_empty_battery_or_a_return_that_is_not_over_is_not_armed() -> None:
-    scene = Scene("ardupilot", arm=True, battery=12)
-    assert scene.run() == "refused"
-    assert "its battery is at 12 %, which is below 30 %" in scene.watch.outcome.text
-    scene = Scene("ardupilot", arm=True)
-    assert scene.run(events=[(0.1, scene.sets(6))]) == "refused"
-    assert "mode RTL" in scene.watch.outcome.text
-    assert (400, 1.0) not in scene.commands
 
 
 def test_what_was_never_read_does_not_stand_for_nothing() -> None:

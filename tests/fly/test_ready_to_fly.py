@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 from conftest import free_port
 from mock_flights import fly
+from scenes import away
 from served import running
 from stations import FENCE, HOME, RALLY, a_mission
-from test_preflight import away
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.main import app

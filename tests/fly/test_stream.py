@@ -1,20 +1,17 @@
-"""Flights by setpoints: the plan is kept, and nothing is sent once somebody else flies."""
+"""Flights by setpoints: the plan is kept, and what no scene can say of streams in trouble."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
-from conftest import FLYABLE, edited
 from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import AnotherStation, Scene, starts
-from simulate import Station
-from stations import FOREIGN, HOME, a_mission, peer_of, vehicle_of
+from scenes import HOLD, LAND, Scene, is_setpoint, low, swift, under
+from stations import a_mission, peer_of, vehicle_of
 
-from faao_mav import optimize, parse_plan
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.fly.own import OwnClock
@@ -22,56 +19,32 @@ from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, Held
 from faao_mav.fly.stream import Stream
 from faao_mav.geodesy import LocalFrame
-from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.prediction import Prediction, price_flight
+from faao_mav.schedule.prediction import Prediction
 from faao_mav.sim.faults import Faults
-from faao_mav.wire.messages import SetPositionTargetLocalNed, Timesync
+from faao_mav.validate.flown import FlightRecord
+from faao_mav.wire.messages import (
+    CurrentMode,
+    Heartbeat,
+    Message,
+    SetPositionTargetLocalNed,
+    Timesync,
+)
 from faao_mav.wire.parameters import Reading
-from faao_mav.wire.protocol import MavCommand
 from faao_mav.wire.transfer.exchange import Peer
 
 KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-LOITER = 5
-"""A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
-LAND = 4 << 16 | 6 << 24
-"""PX4's."""
-HOLD = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 FENCE = {
     "margin": 2,
     "inclusion": [[-30, -30], [80, -30], [80, 80], [-30, 80]],
     "exclusion": [{"polygon": [[-5, 20], [20, 20], [20, 30], [-5, 30]]}],
 }
-LOW: dict[str, Any] = {
-    "flight.start_velocity": "hover",
-    "flight.end_velocity": "hover",
-    "flight.altitude": 6,
-    "flight.duration": 16,
-    "vehicle.max_speed": 6,
-    "vehicle.max_acceleration": 2.5,
-    "mission.on_finish": "land",
-}
-
-
-@cache
-def low() -> Solution:
-    """Return the small plan solved: 16 s at up to 6 m/s, 6 m above home."""
-    return optimize(parse_plan(edited(FLYABLE, LOW)))
-
-
-def under(changes: dict[str, Any]) -> Solution:
-    """Return the same flight for a plan that has what does not change it otherwise."""
-    return replace(low(), problem=build_problem(parse_plan(edited(FLYABLE, LOW | changes))))
 
 
 def flown(scene: Scene, solution: Solution) -> Prediction:
     """Return what became of the plan, on its own clock."""
-    line = scene.watch.seen.record().line(solution)
-    return price_flight(solution, line.t - scene.watch.relay_start, line.w)
-
-
-def is_setpoint(message: object) -> bool:
-    return isinstance(message, SetPositionTargetLocalNed)
+    record: FlightRecord = scene.watch.seen.record()
+    return record.line(solution, scene.watch.relay_start).priced(solution)
 
 
 def setpoints(scene: Scene) -> list[SetPositionTargetLocalNed]:
@@ -95,121 +68,12 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     assert {each.type_mask for each in setpoints(scene)} == {3072}
 
 
-@pytest.mark.parametrize(("kind", "time"), [("ardupilot", 18.0), ("px4", 8.0), ("px4", 18.0)])
-def test_nothing_is_sent_after_a_pilots_mode_change(kind: str, time: float) -> None:
-    scene = Scene(kind, solution=low())
-    guided, sent = scene.watch._guided, list[int]()
-    events = [
-        (time, scene.sets(LOITER)),  # on the way up, or in the relay flight
-        (time + 1.5, lambda _: sent.append(len(scene.orders))),
-        (time + 4.0, scene.sets(guided)),  # back: it stays the pilot's
-        (time + 7.0, scene.does(MavCommand.ARM, 0)),
-    ]
-    assert scene.run(events=events) == "taken over"
-    assert setpoints(scene)
-    assert len(scene.orders) == sent[0]
-    assert scene.told("nothing more is sent")
-
-
-@pytest.mark.parametrize(
-    ("kind", "action", "told"),
-    [
-        ("ardupilot", 0, "it stops after 1 s (GUID_TIMEOUT)"),
-        ("px4", 3, "it changes to Return after 1 s"),
-        ("px4", 0, "it changes to Position (and sinks, unless sticks fly it) after 1 s"),
-    ],
-)
-def test_what_it_does_when_setpoints_cease_is_told_before(
-    kind: str, action: int, told: str
-) -> None:
-    scene = Scene(kind, solution=low(), parameters={"COM_OBL_RC_ACT": action})
-    scene.loses(lambda message, now: is_setpoint(message) and now > 16.0)
-    assert scene.run(events=[(60.0, scene.does(MavCommand.ARM, 0))]) == "taken over"
-    (lost,) = (each for each in scene.watch.findings if each.rule == "on-setpoints-lost")
-    assert lost.message.startswith(f"setpoints lost: {told}")
-    assert scene.told("its failsafe, until setpoints come again") == (action == 3)
-    record = scene.watch.seen.record()
-    if kind == "ardupilot":
-        late = record.line(low()).w[(record.t > 20.0) & (record.t < 59.0)]
-        assert np.ptp(late, axis=0).max() < 0.1
-    else:
-        assert heights(record)[-1] == pytest.approx(0.0, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("action", "pilot", "ending"),
-    [(5, False, "finished"), (5, True, "taken over"), (0, False, "taken over")],
-)
-def test_an_outage_on_px4_ends_the_setpoints_only_where_somebody_may_fly(
-    action: int, pilot: bool, ending: str
-) -> None:
-    """COM_OBL_RC_ACT 5 is Hold, 0 Position, by sticks; the pilot, too, sets Hold meanwhile."""
-    scene, sent = Scene("px4", solution=low(), parameters={"COM_OBL_RC_ACT": action}), list[int]()
-    events = [
-        (17.0, scene.sets(HOLD["px4"]) if pilot else lambda _: None),
-        (22.0, lambda _: sent.append(len(scene.orders))),
-        (27.0, scene.sets(LAND) if pilot else lambda _: None),
-    ]
-    assert scene.run(Faults(outages=((16.0, 18.5),), seed=1), events=events) == ending
-    assert (len(scene.orders) > sent[0]) == (ending == "finished")
-    assert scene.told("its failsafe") == (ending == "finished")
-
-
-@KINDS
-def test_it_is_not_started_where_it_must_not_be(kind: str) -> None:
-    away = under({"site.origin.latitude": HOME.latitude + 0.001})
-    others = [Station(AnotherStation(), FOREIGN)]
-    for solution, ending, beside in ((low(), "contested", others), (away, "refused", [])):
-        scene = Scene(kind, solution=solution)
-        assert scene.run(others=beside) == ending
-        assert scene.orders == []
-    assert "111 m from the mission's home" in scene.watch.outcome.text
+def test_only_copters_are_flown_by_setpoints() -> None:
     peer = peer_of("ardupilot")
     plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
     ready = Readiness(Flight(a_mission(5)), Held({}, Reading({})), plane)
     with pytest.raises(InputError, match="only copters"):
         Stream(plane, low(), ready)
-
-
-@KINDS
-def test_a_pilot_may_have_the_mission_flown_instead(kind: str) -> None:
-    scene = Scene(kind, solution=low())
-    assert scene.run(events=[(18.0, scene.sets(scene.watch._modes.mission))]) == "taken over"
-    record = scene.watch.seen.record()
-    last = scene.mock.mission().items[-2]
-    path = LocalFrame(last.x, last.y).to_local(record.latitude, record.longitude)
-    assert np.linalg.norm(path, axis=1).min() < 1
-    assert not scene.mock.armed
-
-
-@KINDS
-def test_interrupted_it_holds(kind: str) -> None:
-    returns = {"COM_OBL_RC_ACT": 3}
-    scene, modes = Scene(kind, solution=low(), parameters=returns), list[int]()
-    events = [
-        (16.0, scene.interrupt),
-        (20.0, lambda _: modes.append(scene.mock.mode)),
-        (21.0, scene.interrupt),
-    ]
-    assert scene.run(events=events) == "left"
-    asks = [getattr(each, "command", None) == MavCommand.SET_MODE for each in scene.orders]
-    last = max(n for n, asked in enumerate(asks) if asked)
-    assert not any(map(is_setpoint, scene.orders[last:]))
-    assert modes == [HOLD[kind]]
-    for time in (8.0, 14.0):  # without a terminal too
-        scene = Scene(kind, solution=low(), parameters=returns)
-        assert scene.run(events=[(time, scene.hang_up)]) == "left"
-        assert scene.mock.armed
-        assert scene.mock.mode == HOLD[kind]
-        assert scene.watch.outcome.text.startswith("the terminal has gone; the vehicle is in mode ")
-
-
-def test_a_lost_answer_to_the_take_off_does_not_end_it() -> None:
-    scene = Scene("ardupilot", solution=low())
-    scene.loses(lambda message, _: starts(message), heard=True)
-    assert scene.run(until=30.0) == ""
-    assert scene.watch.phase == "flying"
-    assert scene.watch.relay_start is not None
 
 
 @pytest.mark.parametrize("finish", ["rtl", "hover"])
@@ -260,3 +124,100 @@ def test_what_others_asked_tells_nothing_of_the_link() -> None:
         clock.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
     assert clock.speed == pytest.approx(2.0)
     assert clock.lead == pytest.approx(0.2)
+
+
+def test_after_px4s_landing_failsafe_it_climbs_before_it_goes_on() -> None:
+    scene = Scene("px4", solution=swift(), parameters={"COM_OBL_RC_ACT": 4})
+    heights = list[float]()
+    events = [(57.5, lambda _: heights.append(scene.mock.posture(57.5).position[2]))]
+    assert scene.run(Faults(outages=((46.0, 57.4),)), events=events) == "finished"
+    assert 1.0 < heights[0] < 20.0
+    assert scene.told("it is in its failsafe")
+    assert scene.told("off its flight, and led back to it")
+    scene.assert_gated()
+    places, off = np.array(scene.places), scene.off
+    climbs = (np.array(scene.times) > 57.4) & (places[:, 2] < 26.0)
+    assert climbs.sum() > 50
+    assert np.hypot(*off[climbs, :2].T).max() < 0.5
+    scene.assert_arrived()
+
+
+def test_where_no_way_leads_back_it_is_left_to_its_failsafe() -> None:
+    """Its way home, by its failsafe, leads over the zone; there it is heard again."""
+    scene = Scene("px4", solution=swift(fenced=True), parameters={"COM_OBL_RC_ACT": 3})
+    mock, solution = scene.mock, swift(fenced=True)
+    area = solution.plan.keep_in
+    assert area is not None
+
+    over = list[float]()
+
+    def silent(message: Message, now: float) -> Sequence[Message]:
+        place = mock.posture(now).position[None, :2]
+        if now > 60.0 and not over and not area.covers(place).all():
+            over.append(now)
+        return [message] if now < 60.0 or over else []
+
+    scene.tells(silent)
+    assert scene.run() == "taken over"
+    assert over
+    assert scene.told("setpoints end: no way inside the fence leads it back")
+    scene.assert_gated()
+
+
+def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> None:
+    """It was in that mode for want of setpoints before: the last that was heard is a failsafe."""
+    scene = Scene("px4", solution=swift(), parameters={"COM_OBL_RC_ACT": 5})
+    scene.loses(lambda message, now: is_setpoint(message) and 44.0 < now < 48.5)
+    modes = Heartbeat | CurrentMode  # which come after positions, when the link is back
+    scene.tells(lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :])
+    events = [(48.0, scene.sets(HOLD["px4"])), (70.0, scene.sets(LAND))]
+    assert scene.run(Faults(outages=((47.0, 50.0),)), events=events) == "taken over"
+    assert scene.told("it is in its failsafe")
+    assert scene.after(50.0) == 0
+
+
+@KINDS
+def test_what_it_does_without_setpoints_has_to_be_known(kind: str) -> None:
+    vehicle = vehicle_of(kind)
+    assert vehicle is not None
+    rules = vehicle.family.setpoints
+    scene = Scene(kind, solution=low(), untold=rules.defaults)
+    assert scene.run() == "refused"
+    assert f"it does not tell {' and '.join(rules.defaults)}" in scene.watch.outcome.text
+    assert scene.orders == []
+    values = rules.defaults | {rules.timeout: 1.0}
+    assert rules.refusal(values) is None
+    for value in (math.nan, 2.5):
+        assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
+
+
+@KINDS
+def test_positions_that_come_late_at_once_are_not_answered(kind: str) -> None:
+    """A link holds back all that it is given for 6 s, and then delivers it."""
+    held = list[Message]()
+
+    def bursts(message: Message, now: float) -> Sequence[Message]:
+        if 44.0 <= now < 50.0:
+            held.append(message)
+            return ()
+        out = [*held, message]
+        held.clear()
+        return out
+
+    scene = Scene(kind, solution=swift(), parameters={"COM_OBL_RC_ACT": 5})
+    scene.tells(bursts)
+    assert scene.run() == "finished"
+    scene.assert_gated(lag=8.0)
+    told = [each.time_boot_ms / 1000 for each in setpoints(scene)]
+    assert not any(44.1 < each < 48.9 for each in told)
+    assert any(48.9 < each < 51.0 for each in told)
+
+
+def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:
+    """The link breaks as setpoints end, and PX4 goes into its failsafe: it lands all the same."""
+    scene = Scene("px4", solution=under({}), parameters={"COM_OBL_RC_ACT": 5})
+    watch = scene.watch
+    scene.loses(lambda _, now: now < 60.0 and watch.phase == "ending")
+    assert scene.run() == "finished"
+    assert scene.watch.seen.fixes[-1].t > 60.0
+    assert not scene.mock.armed

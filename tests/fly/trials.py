@@ -8,11 +8,20 @@ from typing import Any, get_args
 
 import numpy as np
 from conftest import FLYABLE, edited
-from scenes import METRE, AnotherStation, Scene, arms, during, harmless
+from scenes import (
+    LOITER,
+    METRE,
+    SWIFT,
+    AnotherStation,
+    Scene,
+    arms,
+    during,
+    harmless,
+    low,
+    swift,
+)
 from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted
-from test_gate import SWIFT, swift
-from test_stream import LOITER, low
 
 from faao_mav import optimize, parse_plan
 from faao_mav.fly.gate import LEVEL, NEAR
