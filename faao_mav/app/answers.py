@@ -22,7 +22,7 @@ from faao_mav.optimizer.rough import RoughFlight, rough_flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.zones import PolygonZone
-from faao_mav.report.parts import write_part
+from faao_mav.report import write_part
 from faao_mav.validate.energy import energy_use
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result, plan_mission

@@ -73,8 +73,7 @@ def plan(
     """
     from faao_mav.cli.shared import optimizer_progress
     from faao_mav.cli.transfers import as_dict as upload_as_dict
-    from faao_mav.report import summary
-    from faao_mav.report.parts import write_part
+    from faao_mav.report import summary, write_part
     from faao_mav.workflow import plan_mission
 
     if upload is None and (system is not None or allow_armed):

@@ -21,12 +21,12 @@ def flight_lines(report: FlightReport, found: Debriefing | None) -> Iterator[Lin
     """Yield the lines of a flight that was watched: differences, what was `found`, its ending."""
     yield from (("different", str(each)) for each in report.differences)
     if found is not None:
-        yield from debriefing_lines(found)
+        yield from _debriefing_lines(found)
     if report.ending is not None:
         yield report.ending.kind, report.ending.text
 
 
-def debriefing_lines(found: Debriefing) -> Iterator[Line]:
+def _debriefing_lines(found: Debriefing) -> Iterator[Line]:
     """Yield what became of a plan, hop by hop: planned, predicted and flown."""
     for name, flight in (("predicted", found.predicted), ("flown", found.flown)):
         yield from zip((name, "", "", ""), beside(found.solution, flight), strict=True)
@@ -70,55 +70,52 @@ class FromLog:
         return cls(result, records, *nearest)
 
     @property
-    def wind(self) -> Real | None:
+    def _wind(self) -> Real | None:
         """The velocity of the air as the autopilot estimated it, m/s east and north, or None."""
         return self.record.mean_wind(self.found.start, self.result.solution.plan.flight.duration)
 
     @property
-    def timed(self) -> Mapping[str, float]:
-        """The parameters that the mission is timed for, by name."""
-        return self.result.conversion.parameters if self.result.conversion is not None else {}
+    def _timed(self) -> Mapping[str, float]:
+        """The parameters in the log that the mission is timed for, as it is timed."""
+        timed = self.result.conversion.parameters if self.result.conversion is not None else {}
+        return {name: value for name, value in timed.items() if name in self.record.parameters}
 
     @property
-    def other_parameters(self) -> dict[str, tuple[float, float]]:
+    def _other(self) -> dict[str, tuple[float, float]]:
         """By name the value in the log and the one that the mission is timed for, if another."""
         known = self.record.parameters
         return {
             name: (known[name], value)
-            for name, value in self.timed.items()
-            if name in known and not math.isclose(known[name], value, rel_tol=_SAME)
+            for name, value in self._timed.items()
+            if not math.isclose(known[name], value, rel_tol=_SAME)
         }
 
     def as_dict(self) -> dict[str, Any]:
         """Return the JSON object of `--json`."""
         return debriefing_as_dict(self.found) | {
-            "wind": None if self.wind is None else self.wind.tolist(),
-            "parameters": self.other_parameters,
+            "wind": None if self._wind is None else self._wind.tolist(),
+            "parameters": self._other,
             "system": self.record.system,
         }
 
-    def lines(self) -> list[Line]:
-        """Return what became of the plan, and what else the log says."""
-        return [*debriefing_lines(self.found), *self.remarks()]
-
-    def remarks(self) -> Iterator[Line]:
-        """Yield what the log says of vehicles, wind and parameters."""
+    def lines(self) -> Iterator[Line]:
+        """Yield what became of the plan, and what the log says of vehicles, wind, parameters."""
+        yield from _debriefing_lines(self.found)
         if len(self.records) > 1:
             others = ", ".join(str(r.system) for r in self.records if r is not self.record)
             told = f"system {self.record.system}, by its flight; also in the log: {others}"
             yield "vehicle", told
-        if self.wind is None:
+        if self._wind is None:
             yield "wind", "not estimated by the autopilot"
         else:
-            east, north = map(float, self.wind)
+            east, north = map(float, self._wind)
             start = math.degrees(math.atan2(-east, -north)) % 360
             told = f"{math.hypot(east, north):.1f} m/s from {start:.0f} degrees, as estimated"
             yield "wind", told
-        known = sum(name in self.record.parameters for name in self.timed)
-        if other := self.other_parameters:
+        if other := self._other:
             text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in other.items())
             yield "parameters", f"other than the mission is timed for: {text}"
-        elif self.timed and known:
-            yield "parameters", f"{known} in the log, as the mission is timed for"
-        elif self.timed:
+        elif self._timed:
+            yield "parameters", f"{len(self._timed)} in the log, as the mission is timed for"
+        elif self.result.conversion is not None and self.result.conversion.parameters:
             yield "parameters", "not in the log"

@@ -1,7 +1,7 @@
 """One flight as one HTML page that needs nothing but itself."""
 
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
@@ -12,7 +12,6 @@ from faao_mav.report.style import inline_svg
 from faao_mav.report.summary import Line, check_lines, result_lines
 from faao_mav.validate import Finding
 from faao_mav.validate.check import Check
-from faao_mav.validate.flown import Debriefing
 from faao_mav.validate.words import by_rule, said_of
 from faao_mav.workflow import Result
 
@@ -81,21 +80,63 @@ def _sections(about: Result | Check | FromLog) -> Iterator[str]:
         rows = [(name, f"{value:g}") for name, value in result.conversion.parameters.items()]
         told = "<p>The mission is timed for these: load them first.</p>"
         yield section("Parameters", told + _table(("parameter", "value"), rows))
-    if judged is not None:
-        yield from _mission_figures(judged)
-    if check is not None and check.energy is not None:
-        from faao_mav.report.figures import energy
+    for name, heading, figure, title in _figures(judged, check, result, log):
+        yield figure_section(name, heading, figure, title)
+    if result is not None:
+        solution = result.solution
+        if len(solution.starts) > 1:
+            ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
+            head = ("start", f"{solution.plan.radio.maximised}, bit/s/Hz")
+            yield section("Starts", _table(head, [(name, f"{rate:.4f}") for name, rate in ranked]))
+        yield section("Plan", f"<pre>{escape(solution.plan.text)}</pre>", "wide text")
 
+
+def _figures(
+    judged: Check | None, check: Check | None, result: Result | None, log: FromLog | None
+) -> "Iterator[tuple[str, str, Figure, str]]":
+    """Yield name, heading, figure and title of each: of a mission by itself, and of a plan."""
+    from faao_mav.report import figures
+    from faao_mav.report.maps import mission_map
+
+    if judged is not None and (track := judged.track) is not None:
+        title = "Map of the predicted flight with the mission's items and its fence, metres"
+        yield "mission-map", "Mission", mission_map(judged.mission, track), title
+        title = "Predicted ground speed and height above home over time"
+        yield "mission-motion", "Flight", figures.mission_motion(track), title
+    if check is not None and check.energy is not None:
         what = "energy that is used" if check.energy.battery is None else "energy that is left"
         title = f"Power of the whole predicted flight over time, and the {what}"
-        yield figure_section("energy", "Energy", energy(check.energy), title)
-    if result is not None:
-        yield from _plan_figures(result, log.found if log is not None else None)
-        text = f"<pre>{escape(result.solution.plan.text)}</pre>"
-        yield section("Plan", text, "wide text")
+        yield "energy", "Energy", figures.energy(check.energy), title
+    if result is None:
+        return
+    solution, conversion, prediction = result.solution, result.conversion, result.prediction
+    plan, flown = solution.plan, log.found.flown if log is not None else None
+    (east, north), (to_east, to_north) = plan.flight.start, plan.flight.end
+    title = (
+        f"Map of the route from ({east:g}, {north:g}) to ({to_east:g}, {to_north:g}), east and "
+        "north in metres, coloured by speed, with stations, waypoints by item number, flights and "
+        "the fence"
+    )
+    yield "route", "Route", figures.route(solution, conversion, flown), title
+    if log is not None:
+        title = "Distance from the planned place at equal times, as predicted and as flown"
+        found = log.found
+        yield "apart", "Off the plan", figures.apart(solution, found.predicted, found.flown), title
+    title = "Speed and acceleration over time, with their limits"
+    yield "motion", "Motion", figures.motion(solution, conversion), title
+    title = "Rates of both links over time"
+    yield "rates", "Link", figures.rates(solution, prediction, flown), title
+    half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
+    title = f"What the relay has received and not yet forwarded, over time{half}"
+    yield "queue", "Queue", figures.queue(solution, prediction, flown), title
+    first, last = solution.history[0], solution.history[-1]
+    title = f"{plan.radio.maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz"
+    yield "convergence", "Convergence", figures.convergence(solution), title
+    title = "Power on each stream over time, base station and UAV, strongest stream first"
+    yield "power", "Precoders", figures.precoder_power(solution), title
 
 
-def facts(lines: Sequence[Line]) -> str:
+def facts(lines: Iterable[Line]) -> str:
     """Return labelled lines as a list."""
     facts = "".join(
         (f"<dt>{escape(label)}</dt>" if label else "")
@@ -116,68 +157,6 @@ def _findings(findings: Sequence[Finding]) -> str:
     return f"<ul>{''.join(items)}</ul>"
 
 
-def _mission_figures(check: Check) -> Iterator[str]:
-    """Yield the figures of a mission that is judged by itself."""
-    if check.track is None:
-        return
-    from faao_mav.report.figures import mission_motion
-    from faao_mav.report.maps import mission_map
-
-    title = "Map of the predicted flight with the mission's items and its fence, metres"
-    yield figure_section("mission-map", "Mission", mission_map(check.mission, check.track), title)
-    title = "Predicted ground speed and height above home over time"
-    yield figure_section("mission-motion", "Flight", mission_motion(check.track), title)
-
-
-def _plan_figures(result: Result, debriefing: Debriefing | None) -> Iterator[str]:
-    """Yield the figures of a solved plan, and the table of the optimiser's starts."""
-    from faao_mav.report import figures
-
-    plan = result.solution.plan
-    solution, conversion, prediction = result.solution, result.conversion, result.prediction
-    real = debriefing.flown if debriefing is not None else None
-    flight, vehicle, maximised = plan.flight, plan.vehicle, plan.radio.maximised
-    title = (
-        f"Map of the route from {_place(flight.start)} to {_place(flight.end)}, east and north in "
-        "metres, coloured by speed, with both stations"
-    )
-    if conversion:
-        title += ", waypoints by item number and the predicted track"
-    if real is not None:
-        title += ", and the track that was flown"
-    if plan.fence:
-        title += "; zones of the fence, and the margin that the plan keeps"
-    yield figure_section("route", "Route", figures.route(solution, conversion, real), title)
-    if debriefing is not None and real is not None:
-        title = "Distance from the planned place at equal times, as predicted and as flown"
-        figure = figures.apart(solution, debriefing.predicted, real)
-        yield figure_section("apart", "Off the plan", figure, title)
-    title = (
-        f"Speed over time, limit {vehicle.max_speed:g} m/s, and acceleration over time, limit "
-        f"{vehicle.max_acceleration:g} m/s²"
-    )
-    yield figure_section("motion", "Motion", figures.motion(solution, conversion), title)
-    flown = " and along the predicted flight" if prediction else ""
-    flown += " and as flown" if real is not None else ""
-    title = f"Rates of both links over time, planned{flown}"
-    yield figure_section("rates", "Link", figures.rates(solution, prediction, real), title)
-    half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
-    title = f"What the relay has received and not yet forwarded, over time{half}"
-    yield figure_section("queue", "Queue", figures.queue(solution, prediction, real), title)
-    first, last = solution.history[0], solution.history[-1]
-    title = (
-        f"{maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz; "
-        f"ended: {solution.ending}"
-    )
-    yield figure_section("convergence", "Convergence", figures.convergence(solution), title)
-    title = "Power on each stream over time, base station and UAV, strongest stream first"
-    yield figure_section("power", "Precoders", figures.precoder_power(solution), title)
-    if len(solution.starts) > 1:
-        ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
-        rows = [(name, f"{rate:.4f}") for name, rate in ranked]
-        yield section("Starts", _table(("start", f"{maximised}, bit/s/Hz"), rows))
-
-
 def figure_section(name: str, heading: str, figure: "Figure", title: str) -> str:
     """Return a figure under its heading, with what it shows below."""
     return section(heading, inline_svg(figure, name, title) + f"<p>{escape(title)}.</p>")
@@ -195,10 +174,6 @@ def _table(head: tuple[str, str], rows: Sequence[tuple[str, str]]) -> str:
 
     body = "".join(cells("td", row) for row in rows)
     return f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>"
-
-
-def _place(position: tuple[float, float]) -> str:
-    return f"({position[0]:g}, {position[1]:g})"
 
 
 def _versions() -> str:
