@@ -24,7 +24,7 @@ from conftest import MISSIONS, edited
 from simulators import simulated
 
 from faao_mav import Result, plan_mission
-from faao_mav.fly.fly import FlightReport, fly
+from faao_mav.fly.fly import FlightReport, fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.fly.watch import Watch
 from faao_mav.plan import parse_plan
@@ -112,7 +112,7 @@ def flown(autopilots: Path, autopilot: str, result: Result, case: str) -> Flight
         with simulated(autopilots, kind, folder, *options) as connection:
             upload(result.conversion.mission, connection, wait=60)
             with patch.object(link, "open_transport", disturbance.opened):
-                return fly(
+                return fly_mission(
                     Flight.planned(result.conversion, result.solution, streamed=True),
                     connection,
                     rate=10,

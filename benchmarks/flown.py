@@ -30,7 +30,7 @@ from simulators import simulated, start_log
 from faao_mav import Result, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
-from faao_mav.fly.fly import fly
+from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
@@ -158,7 +158,7 @@ def streamed(autopilots: Path, autopilot: str, result: Result, folder: Path) -> 
     assert result.conversion is not None
     with serving(autopilots, autopilot, result, folder) as connection:
         flight = Flight.planned(result.conversion, solution, streamed=True)
-        report = fly(flight, connection, rate=10, wait=60)
+        report = fly_mission(flight, connection, rate=10, wait=60)
     if report.relay_start is None or report.ending is None or report.ending.kind != "finished":
         raise SystemExit(f"not flown: {report.ending}")
     return report.record.line(solution, report.relay_start).priced(solution)

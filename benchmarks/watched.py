@@ -17,7 +17,7 @@ from pathlib import Path
 from flown import FLOWN, serving
 
 from faao_mav import Result, plan_mission
-from faao_mav.fly.fly import fly
+from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.logs import read_log
 from faao_mav.fly.seen import Flight
 from faao_mav.fly.telling import Telling
@@ -35,7 +35,7 @@ def watched(autopilots: Path, autopilot: str, result: Result, folder: Path) -> s
     telling = Telling(result.solution, result.check.track, None, lambda _: None)
     with serving(autopilots, autopilot, result, folder, speedup=10) as connection:
         flight = Flight.planned(result.conversion, result.solution)
-        report = fly(flight, connection, arm=True, wait=60, watching=telling)
+        report = fly_mission(flight, connection, arm=True, wait=60, watching=telling)
     seen, ending = telling.debriefing(report), report.ending
     if ending is None or seen is None:
         return f"not flown: {ending}"

@@ -6,18 +6,18 @@ A page holds lines `<!-- generated: WHAT -->`; the hook replaces them by Markdow
 - `plan`: the keys of plan.yaml, one table per section, from the schema;
 - `command NAME`: usage and options of a command, from its `--help`;
 - `rules`: the rules of `faao-mission validate --rules`;
-- `names`: the public names of the package with the first sentence of their docstrings.
+
+The reference is mkdocstrings'; `Examples` makes code of the examples in docstrings.
 """
 
-import inspect
 import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import griffe
 from typer.testing import CliRunner
 
-import faao_mav
 from faao_mav.cli.main import app
 from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.validate import RULES
@@ -26,6 +26,7 @@ _DOCS = Path(__file__).parent
 _MARK = re.compile(r"^<!-- generated: (\w+) ?([\w.]*) -->$", re.MULTILINE)
 _OPTION = re.compile(r"^  (-.*?)(?:  +|\n +)((?:.|\n   )*)$", re.MULTILINE)
 """An option and what it is for, on the same or on the next lines of a `--help`."""
+_EXAMPLE = re.compile(r"^>>> .*(?:\n(?!\n).*)*", re.MULTILINE)
 _BRACES = str.maketrans("", "", "{}")
 
 
@@ -94,13 +95,13 @@ def rules() -> str:
     return "\n".join(lines)
 
 
-def names() -> str:
-    """Return the public names of the package with the first sentence of their docstrings."""
-    lines = ["| name | what it is |", "|---|---|"]
-    for name in faao_mav.__all__:
-        first = inspect.cleandoc(getattr(faao_mav, name).__doc__).split("\n\n")[0]
-        lines.append(f"| `{name}` | {_escaped(' '.join(first.split()))} |")
-    return "\n".join(lines)
+class Examples(griffe.Extension):
+    """Fences what begins with `>>>` in docstrings, up to the next empty line."""
+
+    def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
+        """Rewrite the docstring of an object that was read."""
+        if obj.docstring is not None:
+            obj.docstring.value = _EXAMPLE.sub(r"```pycon\n\g<0>\n```", obj.docstring.value)
 
 
 _WRITERS: dict[str, Callable[..., str]] = {
@@ -108,7 +109,6 @@ _WRITERS: dict[str, Callable[..., str]] = {
     "plan": plan,
     "command": command,
     "rules": rules,
-    "names": names,
 }
 
 

@@ -93,6 +93,15 @@ class Result:
     seconds_optimize: float = 0.0
     seconds_total: float = 0.0
 
+    def __repr__(self) -> str:
+        """Say what the plan led to, in a line."""
+        made = str(self.no_mission or "no mission asked for")
+        if self.conversion is not None:
+            errors = sum(finding.level is Level.ERROR for finding in self.findings)
+            made = f"a mission of {len(self.conversion.mission.items)} items, {errors} errors"
+        delivers = f"delivers {self.solution.delivered_rate:.4f} bit/s/Hz"
+        return f"<Result of {self.solution.plan.name!r}: {delivers}, {made}>"
+
     @property
     def findings(self) -> tuple[Finding, ...]:
         """What validation found in the mission; nothing where there is no mission."""

@@ -1,6 +1,7 @@
 """Data flows one way: no import runs upward or in a circle, and costly imports wait."""
 
 import ast
+import re
 import subprocess
 import sys
 from functools import cache
@@ -70,7 +71,7 @@ def test_no_import_runs_upward() -> None:
         (name, other)
         for name, others in all_imports().items()
         for other in others
-        if name != "faao_mav"
+        if name not in ("faao_mav", "faao_mav.__main__")
         and other.split(".")[1] != name.split(".")[1]
         and FLOOR[other.split(".")[1]] >= FLOOR[name.split(".")[1]]
     ]
@@ -101,8 +102,16 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
 def test_every_public_name_can_be_had() -> None:
     assert faao_mav.__all__ == sorted(faao_mav.__all__)
     assert all(getattr(faao_mav, name).__doc__ for name in faao_mav.__all__)
+    assert set(faao_mav.__all__) < set(dir(faao_mav))
+    assert set(re.findall(r"`(\w+)`", faao_mav.__doc__ or "")) == set(faao_mav.__all__)
     with pytest.raises(AttributeError):
         faao_mav.missing  # noqa: B018
+
+
+def test_the_package_is_a_program_with_a_version() -> None:
+    command = [sys.executable, "-m", "faao_mav", "--version"]
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert told == f"faao-mission {faao_mav.__version__}\n"
 
 
 WAITING = (

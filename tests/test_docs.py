@@ -21,6 +21,7 @@ from pages import PAGES, ROOT, blocks, difference
 from test_architecture import FLOORS
 from typer.testing import CliRunner
 
+import faao_mav
 from faao_mav.cli.main import app
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import Plan, parse_plan, read_plan, reference
@@ -208,6 +209,11 @@ def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
     assert shown == {floor: set(rooms) for floor, rooms in enumerate(FLOORS, start=1)}
 
 
+def test_the_reference_has_every_public_name() -> None:
+    shown = re.findall(r"^::: faao_mav\.(\w+)$", PAGES["docs/reference.md"], re.MULTILINE)
+    assert sorted(shown) == faao_mav.__all__
+
+
 def test_the_readme_is_short() -> None:
     assert 700 <= len(PAGES["README.md"].split()) <= 900
 
@@ -223,6 +229,8 @@ def test_the_site_builds_without_a_warning_and_fetches_nothing(tmp_path: Path) -
     )
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
+    shown = (tmp_path / "site" / "reference.html").read_text()
+    assert all(f'id="faao_mav.{name}"' in shown for name in faao_mav.__all__)
     reference_page = html.unescape((tmp_path / "site" / "plan.html").read_text())
     assert "generated:" not in reference_page
     lost = [key.path for key in reference().values() if key.accepted not in reference_page]

@@ -87,7 +87,7 @@ def watched(tell: Tell, look: Callable[[], None], result: Result, connection: st
     It is `faao-mission fly` without --arm: see `faao_mav.fly.fly`, and what that raises. `tell` is
     given what a `Telling` says; `look` raises KeyboardInterrupt to leave the flight.
     """
-    from faao_mav.fly.fly import fly
+    from faao_mav.fly.fly import fly_mission
     from faao_mav.fly.seen import Flight
     from faao_mav.fly.telling import Telling
     from faao_mav.fly.watch import Watch
@@ -100,7 +100,7 @@ def watched(tell: Tell, look: Callable[[], None], result: Result, connection: st
     conversion = _to_fly(result)
     track = result.check.track if result.check is not None else None
     telling = Telling(result.solution, track, None, tell)
-    report = fly(
+    report = fly_mission(
         Flight.planned(conversion, result.solution),
         connection,
         lands=track is None or track.lands,

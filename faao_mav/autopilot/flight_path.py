@@ -85,6 +85,10 @@ class Track:
     reached: Real
     frame: LocalFrame
 
+    def __repr__(self) -> str:
+        """Say how long it lasts, in a line."""
+        return f"<Track: {self.t[-1]:.1f} s in {len(self.t)} instants>"
+
     @property
     def lands(self) -> bool:
         """Whether the flight ends on the ground."""

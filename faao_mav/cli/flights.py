@@ -75,7 +75,7 @@ def fly(
     Exit status: 0 the mission was flown to its end; 1 it was not, or that is not known; 2 unusable
     arguments or input.
     """
-    from faao_mav.fly.fly import fly as run
+    from faao_mav.fly.fly import fly_mission
     from faao_mav.fly.radio import Radios
     from faao_mav.fly.telemetry import POSITION_RATE
     from faao_mav.fly.telling import HEADER, Telling, as_text
@@ -105,7 +105,7 @@ def fly(
     rate = rate if stream else POSITION_RATE
     if radios is not None and solution is not None:  # two positions for each slot at least
         rate = max(rate, 2 / solution.plan.flight.time_step)
-    report = run(
+    report = fly_mission(
         flight,
         to,
         arm=arm,
@@ -186,17 +186,14 @@ def debrief(
     if plan_file is None and solution_file is None:
         raise InputError("--plan or --solution: give the plan that was flown")
     check_page(report, {"LOG": log, "--plan": plan_file, "--solution": solution_file})
-    from faao_mav.fly.logs import read_log
+    from faao_mav import debrief as debriefed
     from faao_mav.fly.radio import Radios
-    from faao_mav.report.debrief import FromLog
     from faao_mav.report.summary import joined
-    from faao_mav.workflow import Result, with_mission
 
-    records = read_log(log, system)
     solution = planned(plan_file, solution_file)
     assert solution is not None
     radios = None if radio is None else Radios(solution, radio)
-    told = FromLog.of(records, with_mission(Result(solution)), str(log))
+    told = debriefed(log, solution, system)
     if report is not None:
         from faao_mav.report.page import render_report
 

@@ -37,7 +37,7 @@ class FlightReport:
     findings: tuple[Finding, ...] = ()
 
 
-def fly(
+def fly_mission(
     flight: Flight,
     connection: str,
     *,

@@ -100,6 +100,11 @@ class Mission:
         check_count(len(self.items), "items", MAX_ITEMS)
         check_count(len(self.rally), "rally points", _MAX_RALLY)
 
+    def __repr__(self) -> str:
+        """Say how large it is, in a line."""
+        zones = len(self.fence.polygons) + len(self.fence.circles)
+        return f"<Mission: {len(self.items)} items, {zones} zones, {len(self.rally)} rally points>"
+
     @property
     def first_place(self) -> LatLon | None:
         """The first place on Earth that an item flies to, degrees; 0, 0 stands for none."""

@@ -164,6 +164,10 @@ class Problem:
     uav_user: Link
     energy: float = math.inf
 
+    def __repr__(self) -> str:
+        """Say whose problem it is, in a line."""
+        return f"<Problem of {self.plan!r}>"
+
     @cached_property
     def free_area(self) -> FreeArea | None:
         """Where the fence and its margin let the path be, local metres; None without a fence."""

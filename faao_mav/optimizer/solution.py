@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.radio.relay import Relayed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +126,24 @@ class Solution:
     shares: Real | None = None
     gain: float | None = None
     least: Least | None = None
+
+    def __repr__(self) -> str:
+        """Say what was solved and found, in a line."""
+        ending = "converged" if self.converged else "not converged"
+        found = f"delivers {self.delivered_rate:.4f} bit/s/Hz, R_avg {self.rates.R_avg:.4f}"
+        return f"<Solution of {self.plan.name!r}: {len(self.t)} slots, {found}, {ending}>"
+
+    def plot(self) -> "Figure":
+        """Return the flight in one figure of matplotlib: map, speed, and both rates."""
+        from faao_mav import flight_figure
+
+        return flight_figure(self)
+
+    def plot_route(self) -> "Figure":
+        """Return the map of the route as a figure of matplotlib."""
+        from faao_mav import route_figure
+
+        return route_figure(self)
 
     @property
     def plan(self) -> Plan:

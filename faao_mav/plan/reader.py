@@ -55,6 +55,12 @@ class Plan(PlanContents):
                 'plan.changed({"flight.altitude": 60}) or Plan.from_dict({...}), which check it'
             )
 
+    def __repr__(self) -> str:
+        """Say what is to be flown, in a line."""
+        flight, given = self.flight, self.vehicle
+        slots = f"{flight.duration:g} s in slots of {flight.time_step:g} s"
+        return f"<Plan {self.name!r}: {slots}, {given.autopilot} {given.type}>"
+
     @property
     def aircraft(self) -> Vehicle:
         """The vehicle, with the parameters that the plan gives."""

@@ -112,6 +112,12 @@ class LinkFit:
     heights: int
     flights: tuple[Samples, ...]
 
+    def __repr__(self) -> str:
+        """Say what was found, in a line."""
+        terms = ", ".join(f"{term:.1f}" for term in self.elevation)
+        law = f"{self.level:.1f} dB at 1 m, n = {self.exponent:.2f}, elevation [{terms}]"
+        return f"<LinkFit: {law}, spread {self.spread:.1f} dB of {self.count} means>"
+
     @property
     def holds(self) -> bool:
         """Whether a law of place says anything: what is left is not beyond `SPREAD_OF_NO_LAW`."""

@@ -56,8 +56,8 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
 """The units of a column, in s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count, `raw` is
 any other device's count."""
 
-_SIK = 1.0 / 1.9, -127.0
-"""dB a count of a SiK radio, and dBm that it counts as 0 (SiK firmware, "RSSI values")."""
+SIK_STEP, _SIK_AT_ZERO = 1.0 / 1.9, -127.0
+"""dB a count of a SiK radio, and dBm that it counts as 0 (SiK firmware; MAVLink, RADIO_STATUS)."""
 
 Calibration: TypeAlias = Sequence[Sequence[float]]
 """Counts of a device, and the dBm that they are: one or two."""
@@ -79,7 +79,7 @@ class Measured:
 
 
 def read_measured(
-    path: Path,
+    path: str | Path,
     station: Sequence[float],
     units: Mapping[str, str] = _NONE,
     calibration: Calibration = (),
@@ -91,6 +91,7 @@ def read_measured(
     of columns whose header does not tell them; `calibration` is a device's. Rows without a number
     are left out. Raises `InputError` for anything else.
     """
+    path = Path(path)
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     header = next(lines, "")
@@ -137,7 +138,7 @@ def level_of(path: Path, told: Real, unit: str, calibration: Calibration = ()) -
                 f"{path}: a device's own counts; expected two of them in dBm by --calibrate "
                 "COUNT=DBM, or --unit rssi=sik, the counts of SiK radios"
             )
-        slope, level = _SIK
+        slope, level = SIK_STEP, _SIK_AT_ZERO
         (count, level), *more = calibration or [(0.0, level)]
         for other, dbm in more:
             slope = (dbm - level) / (other - count)

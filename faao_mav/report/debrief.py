@@ -3,15 +3,26 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
+from faao_mav.fly.logs import read_log
+from faao_mav.optimizer.solution import Solution
+from faao_mav.radio.measured import SIK_STEP
 from faao_mav.report.summary import Line, beside
 from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
-from faao_mav.workflow import Result, debriefing_as_dict
+from faao_mav.validate.words import counted
+from faao_mav.vector import lengths
+from faao_mav.workflow import Result, debriefing_as_dict, with_mission
+
+_RADIO = ("levels", "base_station_db", "ground_user_db")
+"""What `--json` calls what a radio told: see `FromLog`."""
 
 _SAME = 1e-5
 """Relative difference of two parameters that single precision does not tell apart."""
@@ -37,6 +48,15 @@ def _debriefing_lines(found: Debriefing) -> Iterator[Line]:
             f"of the plan's last {found.missing:.1f} s there is no flight: counted as if the "
             "aircraft had stayed where it was seen last",
         )
+
+
+def debrief(log: str | Path, solution: Solution, system: int | None = None) -> "FromLog":
+    """Return what became of the plan of `solution` in the flight of the file `log`.
+
+    Of several vehicles in a `.tlog` it is the one whose flight is the plan's, or that of `system`.
+    Raises `FaaoError` where the plan's flight is not in it, `InputError` for no log.
+    """
+    return FromLog.of(read_log(Path(log), system), with_mission(Result(solution)), str(log))
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +95,26 @@ class FromLog:
         return self.record.mean_wind(self.found.start, self.result.solution.plan.flight.duration)
 
     @property
+    def _radio(self) -> tuple[int, float, float] | None:
+        """How many levels its radio told, and how far their shape is from the planned gains.
+
+        That is the rms difference, dB, within a constant and by the steps of SiK radios, of both
+        hops: base station, ground user. None where it told none on the way.
+        """
+        plan = self.result.solution.plan
+        flight = self.record.line(self.result.solution, self.found.start)
+        told = np.isfinite(self.record.rssi) & (flight.t >= 0) & (flight.t < plan.flight.duration)
+        if not told.any():
+            return None
+        ends = (plan.radio.base_station.position, plan.radio.ground_user.position)
+        apart = [
+            self.record.rssi[told] * SIK_STEP
+            - law.db(lengths(flight.w[told] - end), plan.flight.altitude)
+            for law, end in zip(plan.radio.path_gains, ends, strict=True)
+        ]
+        return int(told.sum()), float(np.std(apart[0])), float(np.std(apart[1]))
+
+    @property
     def _timed(self) -> Mapping[str, float]:
         """The parameters in the log that the mission is timed for, as it is timed."""
         timed = self.result.conversion.parameters if self.result.conversion is not None else {}
@@ -96,11 +136,19 @@ class FromLog:
             "wind": None if self._wind is None else self._wind.tolist(),
             "parameters": self._other,
             "system": self.record.system,
+            "radio": self._radio and dict(zip(_RADIO, self._radio, strict=True)),
         }
 
     def lines(self) -> Iterator[Line]:
-        """Yield what became of the plan, and what the log says of vehicles, wind, parameters."""
+        """Yield what became of the plan, and what else the log says."""
         yield from _debriefing_lines(self.found)
+        if self._radio is not None:
+            count, first, second = self._radio
+            told = (
+                f"{counted(count, 'level')} of a telemetry radio: their shape is {first:.1f} dB rms"
+            )
+            told += f" from the planned gain of the base station, {second:.1f} of the ground user"
+            yield "radio", f"{told}; faao-mission link fits a law to them"
         if len(self.records) > 1:
             others = ", ".join(str(r.system) for r in self.records if r is not self.record)
             told = f"system {self.record.system}, by its flight; also in the log: {others}"

@@ -52,7 +52,7 @@ def flight_figure(
     return figure
 
 
-def route(
+def route_figure(
     solution: Solution, conversion: Conversion | None = None, flown: Prediction | None = None
 ) -> "Figure":
     """Return the map of the route: see `route_map`."""

@@ -117,7 +117,7 @@ def _figures(
         "north in metres, coloured by speed, with stations, waypoints by item number, flights and "
         "the fence"
     )
-    yield "route", "Route", figures.route(solution, conversion, flown), title
+    yield "route", "Route", figures.route_figure(solution, conversion, flown), title
     if log is not None:
         title = "Distance from the planned place at equal times, as predicted and as flown"
         found = log.found

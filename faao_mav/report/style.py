@@ -143,8 +143,9 @@ def render(figure: "Figure", suffix: str) -> bytes:
     return buffer.getvalue()
 
 
-def save_figure(figure: "Figure", path: Path) -> None:
+def save_figure(figure: "Figure", path: str | Path) -> None:
     """Write `figure` to `path`, whole or not at all, in the format of its ending."""
+    path = Path(path)
     check_ending(path, "figure", FORMATS)
     write_whole(path, render(figure, path.suffix))
 

@@ -49,6 +49,10 @@ class Conversion:
     vehicle: Vehicle
     parameters: Mapping[str, float]
 
+    def __repr__(self) -> str:
+        """Say how large the mission is, in a line."""
+        return f"<Conversion: {self.mission!r}, {len(self.parameters)} parameters>"
+
 
 def check_vehicle(plan: Plan) -> None:
     """Raise `InputError` for a vehicle that no mission can be made for, before any work is done.

@@ -35,6 +35,11 @@ class Prediction:
     max_position_error: float
     rms_position_error: float
 
+    def __repr__(self) -> str:
+        """Say what is delivered, and how near the plan the flight is, in a line."""
+        near = f"{self.rms_position_error:.2g} m rms from the plan"
+        return f"<Prediction: {self.delivered_rate:.4f} bit/s/Hz in {self.duration:.1f} s, {near}>"
+
     @property
     def rates(self) -> Rates:
         """R_U, R_G and R_avg of (9), (10), bit/s/Hz."""

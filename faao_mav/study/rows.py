@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
@@ -11,6 +12,7 @@ from statistics import fmean, stdev
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from faao_mav.arrays import Real
@@ -80,6 +82,25 @@ _RESULTS = [each.name for each in fields(StudyRow) if each.name not in ("key", "
 def as_dict(row: StudyRow) -> dict[str, Any]:
     """Return `row` as an object of `--json`: varied keys, then the columns of the table."""
     return {**row.values, **{name: getattr(row, name) for name in _RESULTS}}
+
+
+def as_array(rows: Sequence[StudyRow]) -> NDArray[np.void]:
+    """Return `rows` as a structured array: a field for each varied key and column of the table.
+
+    Numbers that a row does not have are NaN, texts empty. `pandas.DataFrame(as_array(rows))` is the
+    same as a table of pandas.
+    """
+    records = [as_dict(row) for row in rows]
+    columns = {}
+    for name in dict.fromkeys(name for record in records for name in record):
+        values = [record.get(name) for record in records]
+        texts = any(isinstance(value, str) for value in values)
+        missing = "" if texts else math.nan
+        columns[name] = np.array([missing if value is None else value for value in values])
+    made = np.empty(len(rows), [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        made[name] = column
+    return made
 
 
 def append_row(row: StudyRow, directory: Path) -> None:

@@ -36,6 +36,11 @@ class Check:
     energy: EnergyUse | None = None
     prediction: "Prediction | None" = None
 
+    def __repr__(self) -> str:
+        """Say what was found, in a line."""
+        found = ", ".join(f"{len(self.of(level))} {level.name.lower()}s" for level in Level)
+        return f"<Check of {self.mission!r}: {found}>"
+
     def of(self, level: Level) -> tuple[Finding, ...]:
         """Return the findings of `level`."""
         return tuple(finding for finding in self.findings if finding.level is level)

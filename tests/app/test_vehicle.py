@@ -19,7 +19,7 @@ from faao_mav import plan_mission
 from faao_mav.app.vehicle import fly_command, uploaded, watched
 from faao_mav.app.workers import talk
 from faao_mav.errors import FaaoError, PlanError
-from faao_mav.fly.fly import fly
+from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
@@ -70,7 +70,7 @@ def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
         assert not mock.armed
         assert result.conversion is not None
         flight = Flight.planned(result.conversion, result.solution)
-        flown = asyncio.create_task(asyncio.to_thread(fly, flight, connection, arm=True))
+        flown = asyncio.create_task(asyncio.to_thread(fly_mission, flight, connection, arm=True))
         await seen.wait()
         watch.cancel()
         with pytest.raises(asyncio.CancelledError):

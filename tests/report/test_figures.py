@@ -23,7 +23,7 @@ def every() -> list[Any]:
     return [
         figures.flight_figure(solution, conversion(), prediction()),
         figures.flight_figure(solution),
-        figures.route(solution, conversion()),
+        figures.route_figure(solution, conversion()),
         figures.motion(solution, conversion()),
         figures.rates(solution, prediction()),
         figures.precoder_power(solution),
@@ -124,7 +124,7 @@ def test_precoders_for_every_draw_are_averaged(small_plan: MakePlan) -> None:
 
 def test_the_map_has_stations_waypoints_and_fence() -> None:
     found = flown()
-    axes = figures.route(found.solution, conversion()).axes[0]
+    axes = figures.route_figure(found.solution, conversion()).axes[0]
     names = {text.get_text() for text in axes.texts}
     items = enumerate(conversion().mission.items, 1)
     numbers = {str(number) for number, item in items if item.command == 16}
@@ -138,7 +138,7 @@ def test_the_map_has_stations_waypoints_and_fence() -> None:
 
 def test_a_fence_of_kilometres_leaves_the_route_to_be_seen() -> None:
     found = flown()
-    figure = figures.route(found.solution, conversion())
+    figure = figures.route_figure(found.solution, conversion())
     figure.draw_without_rendering()
     plot = figure.axes[0]
     assert np.ptp(plot.dataLim.intervalx) < 3 * np.ptp(found.solution.w[:, 0])
@@ -148,7 +148,7 @@ def test_a_fence_of_kilometres_leaves_the_route_to_be_seen() -> None:
 def test_what_is_written_on_the_map_stays_apart() -> None:
     found = flown()
     for figure in (
-        figures.route(found.solution, conversion()),
+        figures.route_figure(found.solution, conversion()),
         figures.flight_figure(found.solution, conversion(), prediction()),
     ):
         figure.draw_without_rendering()

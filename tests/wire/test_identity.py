@@ -19,7 +19,7 @@ from served import running
 from stations import HOME, VEHICLE, Air, a_mission
 
 from faao_mav.errors import LinkError
-from faao_mav.fly.fly import fly
+from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import Timeouts, download, upload
@@ -152,7 +152,7 @@ def test_two_vehicles_of_one_number_are_not_one() -> None:
     with two_of_one_number() as (connection, mocks):
         for job in (
             lambda: upload(a_mission(5), connection),
-            lambda: fly(Flight(a_mission(5)), connection, arm=True, system=1),
+            lambda: fly_mission(Flight(a_mission(5)), connection, arm=True, system=1),
             lambda: download(connection),
         ):
             with pytest.raises(LinkError, match=told):
@@ -314,11 +314,11 @@ def test_only_who_flies_is_a_ground_station(sent: list[bytes]) -> None:
         def stop(_: object) -> None:
             raise KeyboardInterrupt
 
-        watched = fly(Flight(mission), connection, watching=stop)
+        watched = fly_mission(Flight(mission), connection, watching=stop)
         assert watched.ending is not None
         assert watched.ending.kind == "left"
         assert beats(sent) == []
-        flown = fly(Flight(mission), connection, arm=True)
+        flown = fly_mission(Flight(mission), connection, arm=True)
         assert flown.ending is not None
         assert flown.ending.kind == "finished"  # our own heartbeats come back: they are no other's
     assert {sender_of(packet) for packet in sent} == {GROUND_STATION}
@@ -389,7 +389,7 @@ def test_only_transfers_knock(monkeypatch: pytest.MonkeyPatch) -> None:
         for job in (
             lambda to: upload(a_mission(5), to, **options),
             lambda to: holdings(to, **options),
-            lambda to: fly(Flight(a_mission(5)), to, **options),
+            lambda to: fly_mission(Flight(a_mission(5)), to, **options),
         ):
             with pytest.raises(LinkError, match="no heartbeat"):
                 job(connection)
