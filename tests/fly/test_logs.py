@@ -27,7 +27,7 @@ from faao_mav.errors import InputError
 from faao_mav.fly import logs
 from faao_mav.fly.logs import Said, flights, messages, read_log
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.solution import save_solution
+from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import parse_plan
 from faao_mav.validate.flown import FlightRecord
 
@@ -95,6 +95,24 @@ def test_px4s_log_tells_what_was_heard(solutions: dict[str, Path], tmp_path: Pat
     page = (tmp_path / "page.html").read_text()
     assert "5.0 m/s from 323 degrees" in page
     assert "Distance from the planned place at equal times, as predicted and as flown" in page
+
+
+def test_what_a_radio_counted_is_compared_with_the_planned_gains(
+    solutions: dict[str, Path], tmp_path: Path
+) -> None:
+    """Levels that are 4 dB above and below d^-2 from the base station are that far from it."""
+    record, radio = the_flight(LOGS / "px4.tlog"), parse_plan(PLAN.read_text()).radio
+    line = record.line(load_solution(solutions["px4"]))
+    away = np.hypot(*(line.w - np.array(radio.base_station.position)).T)
+    count = np.arange(len(away))
+    level = -20 * np.log10(np.hypot(away, line.up)) + 4.0 * (-1) ** (count // 5)
+    rssi = np.where(count % 5 == 0, np.round(150 + 1.9 * level), np.nan)
+    log = tmp_path / "flight.tlog"
+    log.write_bytes(tlog(heard(replace(record, rssi=rssi))))
+    told = debriefed(log, solutions["px4"])["radio"]
+    assert told["levels"] > 50
+    assert told["base_station_db"] == pytest.approx(4.0, abs=0.3)
+    assert debriefed(LOGS / "px4.tlog", solutions["px4"])["radio"] is None
 
 
 def test_parameters_other_than_the_missions_are_told(
