@@ -7,7 +7,6 @@ legs whose speeds hardly differ share one, and values are rounded to what is sen
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Schedule, positions_at
+from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, GOOD_COST, WORTHWHILE, Scheduler
 from faao_mav.vector import lengths
 
@@ -56,36 +55,27 @@ class CopterScheduler(Scheduler):
             top_speed *= OVERSPEED
             best = self.fitted(best.route, top_speed, begun=best)
         for _ in range(_ROUNDS):
-            tried = (self.fitted(route, top_speed) for route in self._splits(best))
-            good = (each for each in tried if each.cost <= WORTHWHILE * best.cost)
-            better = next(good, None)
-            if better is None:
+            times = self._split_times(best)
+            if not len(times):
                 break
-            best = better
+            tried = self.fitted(self._split(best.route, times), top_speed)
+            if tried.cost > WORTHWHILE * best.cost:
+                break
+            best = tried
         return self.rounded(self.shared(best, top_speed), top_speed)
 
-    def _splits(self, schedule: Schedule) -> Iterator[Route]:
-        """Yield the route with all legs split that are off by too much, with half, with one.
+    def _split(self, route: Route, times: Real) -> Route:
+        """Return the route with waypoints more where the plan is at the `times` (k,), s.
 
-        A leg may become too short for its speed: then fewer splits can be better than all. The
-        fit begins with parts whose speeds differ as the plan's do.
+        The speeds of the parts of a leg differ as the plan's do: the fit begins with them.
         """
-        route, times = schedule.route, self._split_times(schedule)
-        for count in dict.fromkeys((len(times), len(times) // 2, 1)):
-            if 0 < count <= len(times):
-                chosen = np.array(sorted(times[:count]))
-                at = np.searchsorted(route.arrivals, chosen)
-                positions = positions_at(chosen, self.t, self.w)
-                split = route.insert(at, positions, chosen, route.speeds[at - 1])
-                planned = _planned_speeds(route)
-                shares = _planned_speeds(split) / np.insert(planned, at, planned[at - 1])
-                yield replace(split, speeds=shares * split.speeds)
+        at, split = np.searchsorted(route.arrivals, times), self.with_waypoints(route, times)
+        planned = _planned_speeds(route)
+        shares = _planned_speeds(split) / np.insert(planned, at, planned[at - 1])
+        return replace(split, speeds=shares * split.speeds)
 
-    def _split_times(self, schedule: Schedule) -> list[float]:
-        """Return the plan's times, s, at which legs that are off by too much are best split.
-
-        The leg that is off the most comes first.
-        """
+    def _split_times(self, schedule: Schedule) -> Real:
+        """Return the plan's times (k,), s, at which legs that are too far off are best split."""
         route = schedule.route
         off = lengths(schedule.positions(self.t) - self.w)
         splits = []
@@ -99,7 +89,7 @@ class CopterScheduler(Scheduler):
                 splits.append((float(off[inside].max()), float(self.t[at])))
         splits.sort(reverse=True)
         most = _MOST_WAYPOINTS if schedule.cost <= GOOD_COST else _MOST_TO_MEND
-        return [time for _, time in splits[: max(0, most - len(route.positions))]]
+        return np.sort([time for _, time in splits[: max(0, most - len(route.positions))]])
 
     def _long_enough(self, route: Route, k: int, inside: Integers) -> Flags:
         """Tell for each sample `inside` leg k whether both parts are long enough for their speed.

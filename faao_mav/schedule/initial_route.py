@@ -14,7 +14,7 @@ from faao_mav.autopilot import Model
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route, sent_speeds
-from faao_mav.schedule.waypoints import LEG_SHARE, Waypoint, fits, hovers_and_ends, simplify
+from faao_mav.schedule.waypoints import LEG_SHARE, Waypoint, hovers_and_ends, simplify
 from faao_mav.vector import lengths
 
 _MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
@@ -33,15 +33,14 @@ def initial_route(t: ArrayLike, w: ArrayLike, plan: Plan, *, share: float = 1.0)
     positions at those times, metres. Raises `InputError` for what is no trajectory.
     """
     times, positions = _checked(t, w)
-    legs, slowest = plan.aircraft.flight_model(), slowest_leg(plan)
-    tolerance = share * plan.mission.path_tolerance
+    slowest, tolerance = slowest_leg(plan), share * plan.mission.path_tolerance
     fixed = hovers_and_ends(times, positions, tolerance, slowest)
     waypoints = [fixed[0]]
     for start, stop in pairwise(fixed):
         stretch = slice(start.last, stop.first + 1)
         path = positions[stretch].copy()
         path[0], path[-1] = start.position, stop.position
-        inner = _apart(path, simplify(path, LEG_SHARE * tolerance), legs.least, tolerance)
+        inner = simplify(path, LEG_SHARE * tolerance)
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
     return _timed(times, waypoints, slowest, plan.max_ground_speed)
@@ -103,21 +102,6 @@ def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:
     if not (np.diff(times) > 0).all():
         raise InputError("trajectory: t must increase")
     return times, positions
-
-
-def _apart(path: Real, inner: list[int], least: float, tolerance: float) -> list[int]:
-    """Return `inner`, points of `path` (n, 2), without those that make a leg shorter than `least`.
-
-    Points stay without which a sample of the path were farther than `tolerance` from its leg; m.
-    """
-    ends = [0, *inner, len(path) - 1]
-    for k in inner:
-        at = ends.index(k)
-        before, after = ends[at - 1], ends[at + 1]
-        short = min(lengths(path[[before, after]] - path[k])) < least
-        if short and fits(path, before, after, tolerance):
-            del ends[at]
-    return ends[1:-1]
 
 
 def _timed(t: Real, waypoints: list[Waypoint], slowest: float, max_speed: float) -> Route:

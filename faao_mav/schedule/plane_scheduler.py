@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from faao_mav.arrays import Real
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
@@ -21,6 +22,8 @@ _MOVES = 12  # times that the waypoints are moved; twice as many bring a tenth a
 # The share of its offset from the plan by which a waypoint is moved the other way: with more,
 # neighbouring waypoints correct the same offset and overdo it.
 _MOVE_SHARE = 0.5
+
+_PASSING_WINDOW = 6.0  # s before and after a waypoint counts as reached, in which it is passed
 
 _SPLITS = 2  # times that legs are split off which the flight strays too far; chosen
 _STRAY = 0.5  # the share of the path tolerance beyond which a leg is split; chosen
@@ -40,7 +43,7 @@ class PlaneScheduler(Scheduler):
         Its speeds are the airspeeds to command for the plan's.
         """
         ratio = self.model.true_over_commanded(self.altitude)
-        route = self._with(route, self._changes(route))
+        route = self.with_waypoints(route, self._changes(route))
         ways = np.diff(route.positions, axis=0)
         ground = ways * (route.speeds / lengths(ways))[:, None]
         speeds = np.clip(lengths(ground - self.wind) / ratio, self.min_speed, self.max_speed)
@@ -56,13 +59,30 @@ class PlaneScheduler(Scheduler):
 
     def _kept(self, route: Route) -> Schedule:
         """Return the flight of `route` with its waypoints moved to keep the path best."""
-        points = np.arange(route.first + 1, route.last + 1)
         schedule = best = self.flight(route)
         for _ in range(_MOVES):
-            schedule = self.flight(self.moved(schedule, points, _MOVE_SHARE))
+            schedule = self.flight(self._moved(schedule))
             if schedule.deviation.path < best.deviation.path:
                 best = schedule
         return best
+
+    def _moved(self, schedule: Schedule) -> Route:
+        """Return the route with its waypoints moved against the flight's offsets, by `_MOVE_SHARE`.
+
+        An offset is that from the plan's position when it passes the waypoint to the nearest
+        position of the flight within 6 s of when the waypoint counts as reached, for the flight may
+        pass it again.
+        """
+        route, flown = schedule.route, schedule.flown
+        positions = route.positions.copy()
+        planned = positions_at(route.arrivals, self.t, self.w)
+        for k in range(route.first + 1, route.last + 1):
+            about = flown.arrivals[k]
+            window = [about - _PASSING_WINDOW, about + _PASSING_WINDOW]
+            first, last = np.searchsorted(flown.t, window)
+            near = flown.position[first:last, :2]
+            positions[k] -= _MOVE_SHARE * (near[np.argmin(lengths(near - planned[k]))] - planned[k])
+        return replace(route, positions=positions)
 
     def _split(self, schedule: Schedule) -> Route:
         """Return the route with a waypoint more on each leg where the flight strays too far."""
@@ -74,9 +94,9 @@ class PlaneScheduler(Scheduler):
             inside = np.flatnonzero((self.t > begin) & (self.t < end))
             if len(inside) and stray[inside].max() > _STRAY * self.tolerance:
                 times.append(float(self.t[inside[np.argmax(stray[inside])]]))
-        return self._with(route, times)
+        return self.with_waypoints(route, np.array(times))
 
-    def _changes(self, route: Route) -> list[float]:
+    def _changes(self, route: Route) -> Real:
         """Return times, s, at which legs are split so that changes of speed can begin there.
 
         The vehicle takes as long for the plan's whole range of speeds as `speed_rates` says. So
@@ -91,13 +111,7 @@ class PlaneScheduler(Scheduler):
             apart = np.abs(np.append(route.arrivals, times[-1:]) - time).min()
             if len(near) and np.ptp(near) > _CHANGE * near.max() and apart > _SHORTEST_TIME:
                 times.append(time)
-        return times
-
-    def _with(self, route: Route, times: list[float]) -> Route:
-        """Return the route with a waypoint more where the plan is at each of the `times`, s."""
-        at = np.searchsorted(route.arrivals, times)
-        positions = positions_at(np.array(times), self.t, self.w)
-        return route.insert(at, positions, np.array(times), route.speeds[at - 1])
+        return np.array(times)
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with the speeds that fit best, few and as they are sent."""

@@ -16,7 +16,6 @@ from faao_mav.schedule.retimed import Retimed
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Schedule, positions_at
 from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
-from faao_mav.vector import lengths
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.
@@ -25,12 +24,9 @@ ALLOWED_ERROR = 0.8
 WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 GOOD_COST = 1.5  # the cost of a schedule, m, from which nothing costlier is tried to better it
 
-_PASSING_WINDOW = 6.0  # s before and after a waypoint counts as reached, in which it is passed
 _ALIKE = (0.1, 0.03)  # relative differences of neighbours' speeds that are tried as one, in turn
 _SHARED_COST = 1.05  # the largest ratio of the costs with and without shared speeds to accept
-_WAIT_DIGITS = (
-    2  # decimals of a commanded wait in s: with one, 8 of 77 schedules became a third worse
-)
+_WAIT_DIGITS = 2  # decimals of a commanded wait, s: one makes 8 of 77 schedules a third worse
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,23 +103,11 @@ class Scheduler(ABC):
         route = schedule.route
         return Retimed(schedule, self.model.leg_durations(route.leg_lengths, route.joined))
 
-    def moved(self, schedule: Schedule, points: Integers, share: float) -> Route:
-        """Return the route with the waypoints `points` (k,) moved against the flight's offset.
-
-        They move by a `share` of it. The offset is that from the plan's position when it passes
-        the waypoint to the nearest position of the flight within 6 s of when the waypoint counts
-        as reached, for the flight may pass it again.
-        """
-        route, flown = schedule.route, schedule.flown
-        planned = positions_at(route.arrivals[points], self.t, self.w)
-        positions = route.positions.copy()
-        for k, place in zip(points, planned, strict=True):
-            about = flown.arrivals[k]
-            window = [about - _PASSING_WINDOW, about + _PASSING_WINDOW]
-            first, last = np.searchsorted(flown.t, window)
-            near = flown.position[first:last, :2]
-            positions[k] -= share * (near[np.argmin(lengths(near - place))] - place)
-        return replace(route, positions=positions)
+    def with_waypoints(self, route: Route, times: Real) -> Route:
+        """Return the route with a waypoint more where the plan is at each of `times` (k,), s."""
+        at = np.searchsorted(route.arrivals, times)
+        positions = positions_at(times, self.t, self.w)
+        return route.insert(at, positions, times, route.speeds[at - 1])
 
     def shared(self, schedule: Schedule, top_speed: float) -> Schedule:
         """Return `schedule` with one speed for neighbouring legs wherever that hardly costs."""
@@ -139,24 +123,13 @@ class Scheduler(ABC):
     def rounded(self, schedule: Schedule, top_speed: float) -> Schedule:
         """Return `schedule` with the values that are sent, and a last wait to the plan's end."""
         route = schedule.route
-        route = replace(
-            route,
-            speeds=sent_speeds(route.speeds, top_speed),
-            waits=np.round(route.waits, _WAIT_DIGITS),
-            lead=round(route.lead, _WAIT_DIGITS),
-        )
-        if route.last < len(route.waits) - 1:
-            return self.flight(route)
-        sent = self.flight(self._lasting(route, schedule))
-        lasting = self._lasting(route, sent)
-        return sent if lasting.waits[-1] == sent.route.waits[-1] else self.flight(lasting)
-
-    def _lasting(self, route: Route, schedule: Schedule) -> Route:
-        """Return `route`, flown like `schedule`, with a wait to the end of the plan's last slot."""
-        end = 2 * self.t[-1] - self.t[-2]
-        early = end + schedule.start - schedule.flown.arrivals[-1]
-        last_wait = max(SHORTEST_HOLD, np.ceil(early))
-        return replace(route, waits=np.append(route.waits[:-1], last_wait))
+        lead, waits = round(route.lead, _WAIT_DIGITS), np.round(route.waits, _WAIT_DIGITS)
+        if route.last == len(waits) - 1:  # it ends at rest, and the plan with its last slot
+            end = 2 * self.t[-1] - self.t[-2]
+            early = end + schedule.start - schedule.flown.arrivals[-1]
+            waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
+        speeds = sent_speeds(route.speeds, top_speed)
+        return self.flight(replace(route, speeds=speeds, waits=waits, lead=lead))
 
     def _with_radii(self, route: Route) -> Route:
         """Return `route` with the acceptance radii that suit its legs and turns."""

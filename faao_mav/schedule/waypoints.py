@@ -235,14 +235,14 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
     first, last = 0, len(w) - 1
     while True:
         step = 1
-        while first + step < last and fits(w, first, min(first + 2 * step, last), tolerance):
+        while first + step < last and _fits(w, first, min(first + 2 * step, last), tolerance):
             step = min(2 * step, last - first)
         if first + step >= last:
             return ends
         low, high = step, min(2 * step, last - first)
         while high - low > 1:
             middle = (low + high) // 2
-            if fits(w, first, first + middle, tolerance):
+            if _fits(w, first, first + middle, tolerance):
                 low = middle
             else:
                 high = middle
@@ -250,7 +250,7 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
         ends.append(first)
 
 
-def fits(w: Real, first: int, last: int, tolerance: float) -> bool:
+def _fits(w: Real, first: int, last: int, tolerance: float) -> bool:
     """Tell whether the samples between two stay close to the leg from one to the other."""
     passed = w[first + 1 : last]
     return bool(
