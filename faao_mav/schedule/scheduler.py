@@ -10,12 +10,13 @@ import numpy as np
 
 from faao_mav.arrays import Integers, Real
 from faao_mav.autopilot import Model, Vehicle
+from faao_mav.errors import InputError
 from faao_mav.plan import Vector
 from faao_mav.schedule.initial_route import with_run_in
 from faao_mav.schedule.retimed import Retimed
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.schedule import Schedule, positions_at
-from faao_mav.schedule.timing import MOST_FLIGHTS, SHORTEST_HOLD, fit
+from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Unknowns, stepped
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.
@@ -23,6 +24,10 @@ ALLOWED_ERROR = 0.8
 
 WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 GOOD_COST = 1.5  # the cost of a schedule, m, from which nothing costlier is tried to better it
+
+_MOST_FLIGHTS = 5  # of a fit
+_LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
+_FITTED = 0.4  # the root of the sum of squares, m, that is left as it is
 
 _ALIKE = (0.1, 0.03)  # relative differences of neighbours' speeds that are tried as one, in turn
 _SHARED_COST = 1.05  # the largest ratio of the costs with and without shared speeds to accept
@@ -75,28 +80,36 @@ class Scheduler(ABC):
         top_speed: float,
         *,
         groups: Integers | None = None,
-        flights: int = MOST_FLIGHTS,
+        flights: int = _MOST_FLIGHTS,
         begun: Schedule | None = None,
     ) -> Schedule:
-        """Return the flight of `route` with the speeds and waits that fit best.
+        """Return the flight of `route` with the speeds, the waits and the lead that fit best.
 
         No speed is above `top_speed`, m/s; legs with the same number in `groups` share one. So many
         `flights` are predicted at most; `begun` is that of `route`, where it is known.
         """
-        route = self._with_radii(route)
-        free = (route.waits > 0) & (np.arange(len(route.waits)) != 0)
-        free[-1] = False
-        return fit(
-            self.flight,
-            route,
-            groups=np.arange(len(route.speeds)) if groups is None else groups,
-            free=free,
-            min_speed=self.min_speed,
-            max_speed=top_speed,
-            flights=flights,
-            retime=self._retimed,
-            begun=begun,
-        )
+        if len(route.speeds) == 0:
+            return self.flight(route)
+        groups = np.arange(len(route.speeds)) if groups is None else groups
+        unknowns, goal = Unknowns(route, groups, self.min_speed, top_speed), Goal(self.t, self.w)
+        x = unknowns.initial
+        best = begun or self.flight(unknowns.commanded(x))
+        cost = goal.cost(best)
+        for _ in range(flights - 1):
+            tried, foreseen = stepped(goal, unknowns, self._retimed(best), x)
+            if foreseen > (1 - _LEAST_GAIN) * cost:
+                break
+            try:
+                flown = self.flight(unknowns.commanded(tried))
+            except InputError:  # it is not followed to its end
+                break
+            before, now = cost, goal.cost(flown)
+            if now >= before:
+                break
+            x, best, cost = tried, flown, now
+            if now > (1 - _LEAST_GAIN) * before or now < _FITTED**2:
+                break
+        return best
 
     def _retimed(self, schedule: Schedule) -> Retimed:
         """Return what `schedule` becomes at other commands."""

@@ -9,13 +9,11 @@ follows: later legs and waits make up for earlier ones.
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.errors import InputError
+from faao_mav.arrays import Integers, Real
 from faao_mav.schedule.retimed import Retimed, Retiming
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import LATE_WEIGHT, Schedule
@@ -23,72 +21,26 @@ from faao_mav.schedule.schedule import LATE_WEIGHT, Schedule
 MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
 
-MOST_FLIGHTS = 5  # of a fit
-
 _SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
 _STEPS = 8  # the most steps with one flight retimed
-_LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
-_GOOD = 0.4  # the root of the sum of squares, m, that is left as it is
 _SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
 _MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
 _CRAWL = 0.5  # the least speed, m/s, to which a leg is slowed that is planned to be faster
 
 
-def fit(
-    flight: Callable[[Route], Schedule],
-    route: Route,
-    *,
-    groups: Integers,
-    free: Flags,
-    min_speed: float,
-    max_speed: float,
-    flights: int = MOST_FLIGHTS,
-    retime: Callable[[Schedule], Retimed] = Retimed,
-    begun: Schedule | None = None,
-) -> Schedule:
-    """Return the `flight` of `route` with the speeds, the waits and the lead that fit best.
+class Unknowns:
+    """The unknowns x (k,) of a fit: a speed for each group of legs, the waits between, the lead.
 
-    Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. Speeds stay
-    within `min_speed` and `max_speed` (m/s), the waits at the points `free` (m,) at or above
-    `SHORTEST_HOLD`; the others stay as they are. The lead is within `MOST_LEAD`, 0 for a flight
-    that begins at speed. Being late or early at the end counts as well: `LATE_WEIGHT`.
-    So many `flights` are predicted at most, with that of `route` itself, which is `begun` if it is
-    known.
-    """
-    if len(route.speeds) == 0:
-        return flight(route)
-    unknowns = _Unknowns(route, groups, free, min_speed, max_speed)
-    x = unknowns.initial
-    best = begun or flight(unknowns.commanded(x))
-    goal = _Goal(best.t, best.w)
-    cost = goal.cost(best)
-    for _ in range(flights - 1):
-        tried, foreseen = _stepped(goal, unknowns, retime(best), x)
-        if foreseen > (1 - _LEAST_GAIN) * cost:
-            break
-        try:
-            flown = flight(unknowns.commanded(tried))
-        except InputError:  # it is not followed to its end
-            break
-        before, now = cost, goal.cost(flown)
-        if now >= before:
-            break
-        x, best, cost = tried, flown, now
-        if now > (1 - _LEAST_GAIN) * before or now < _GOOD**2:
-            break
-    return best
-
-
-class _Unknowns:
-    """The unknowns x (k,) of a fit: a speed for each group of legs, the free waits, the lead.
-
-    They stay within `low` and `high` (k,). `chain` (2 m, k) tells what they do to the speeds of
+    Legs with the same number in `groups` (m - 1,), counted from 0, share a speed. They stay within
+    `low` and `high` (k,): speeds within `min_speed` and `max_speed`, m/s, waits at or above
+    `SHORTEST_HOLD`, the lead within `MOST_LEAD`, 0 for a flight that begins at speed. The first
+    wait and the last stay as they are. `chain` (2 m, k) tells what they do to the speeds of
     all legs, the waits at all points and the lead.
     """
 
-    def __init__(
-        self, route: Route, groups: Integers, free: Flags, min_speed: float, max_speed: float
-    ) -> None:
+    def __init__(self, route: Route, groups: Integers, min_speed: float, max_speed: float) -> None:
+        free = route.waits > 0
+        free[[0, -1]] = False
         self._route, self._groups, self._free = route, groups, free
         means = np.bincount(groups, route.speeds) / np.bincount(groups)
         self._speeds, waits = len(means), int(free.sum())
@@ -119,7 +71,7 @@ class _Unknowns:
         return within
 
 
-class _Goal:
+class Goal:
     """The residuals whose sum of squares is least for a flight at `w` (n, 2), m, at `t` (n,), s."""
 
     def __init__(self, t: Real, w: Real) -> None:
@@ -153,7 +105,7 @@ class _Goal:
         return slopes
 
 
-def _stepped(goal: _Goal, unknowns: _Unknowns, retimed: Retimed, begin: Real) -> tuple[Real, float]:
+def stepped(goal: Goal, unknowns: Unknowns, retimed: Retimed, begin: Real) -> tuple[Real, float]:
     """Return the best `x` (k,) of the `retimed` flight from `begin` on, and its cost, m²."""
     low, high = unknowns.low, unknowns.high
 
