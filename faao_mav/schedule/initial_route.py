@@ -7,11 +7,9 @@ flight.
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Model
-from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route, sent_speeds
 from faao_mav.schedule.waypoints import LEG_SHARE, Waypoint, hovers_and_ends, simplify
@@ -20,7 +18,7 @@ from faao_mav.vector import lengths
 _MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 
 
-def initial_route(t: ArrayLike, w: ArrayLike, plan: Plan, *, share: float = 1.0) -> Route:
+def initial_route(t: Real, w: Real, plan: Plan, *, share: float = 1.0) -> Route:
     """Return waypoints, waits and speeds that follow the trajectory.
 
     The polyline through the waypoints passes every sample of `w` within `share` of
@@ -30,20 +28,19 @@ def initial_route(t: ArrayLike, w: ArrayLike, plan: Plan, *, share: float = 1.0)
     speed up and slow down is not allowed for.
 
     `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
-    positions at those times, metres. Raises `InputError` for what is no trajectory.
+    positions at those times, metres.
     """
-    times, positions = _checked(t, w)
     slowest, tolerance = slowest_leg(plan), share * plan.mission.path_tolerance
-    fixed = hovers_and_ends(times, positions, tolerance, slowest)
+    fixed = hovers_and_ends(t, w, tolerance, slowest)
     waypoints = [fixed[0]]
     for start, stop in pairwise(fixed):
         stretch = slice(start.last, stop.first + 1)
-        path = positions[stretch].copy()
+        path = w[stretch].copy()
         path[0], path[-1] = start.position, stop.position
         inner = simplify(path, LEG_SHARE * tolerance)
         waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
         waypoints.append(stop)
-    return _timed(times, waypoints, slowest, plan.max_ground_speed)
+    return _timed(t, waypoints, slowest, plan.max_ground_speed)
 
 
 def slowest_leg(plan: Plan) -> float:
@@ -89,19 +86,6 @@ def set_out(t: Real, w: Real, plan: Plan) -> float:
 def begins_at_speed(t: Real, w: Real) -> bool:
     """Tell whether the plan `t` (n,) s, `w` (n, 2) m begins faster than 0.5 m/s."""
     return float(lengths(_end_velocities(t, w)[0])) > _MOVING
-
-
-def _checked(t: ArrayLike, w: ArrayLike) -> tuple[Real, Real]:
-    times, positions = np.asarray(t, dtype=float), np.asarray(w, dtype=float)
-    if times.ndim != 1 or len(times) < 2 or positions.shape != (len(times), 2):
-        raise InputError(
-            f"trajectory: t {times.shape} and w {positions.shape}; expected (n,) and (n, 2), n >= 2"
-        )
-    if not (np.isfinite(times).all() and np.isfinite(positions).all()):
-        raise InputError("trajectory: t and w must be finite")
-    if not (np.diff(times) > 0).all():
-        raise InputError("trajectory: t must increase")
-    return times, positions
 
 
 def _timed(t: Real, waypoints: list[Waypoint], slowest: float, max_speed: float) -> Route:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.errors import InputError
 from faao_mav.optimizer.solution import Rates, Solution
 from faao_mav.radio.relay import Relayed
 from faao_mav.schedule.schedule import deviation, positions_at
@@ -88,10 +87,7 @@ def rates_along(
     precoders are those of the same slot, or of `slots` (n,), as `nearest_slots` gives for a radio
     that goes by position. Precoders that know the draw of an averaged fading stay with the draw.
     With `only` (k,) they are the rates (k,) of those slots of the n alone.
-    Raises `InputError` unless `w` has one position per slot.
     """
-    if w.shape != solution.w.shape:
-        raise InputError(f"positions {w.shape}; expected one per slot, {solution.w.shape}")
     at = np.arange(len(w)) if only is None else only
     of = at if slots is None else slots[at]
     I_U, I_G = (

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from relay_flights import STEADY, Trajectory, dash, dash_hover_dash, items_of, plan_with
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.initial_route import initial_route
@@ -229,22 +228,6 @@ def test_a_speed_is_rounded_down_at_the_limit() -> None:
     assert route.speeds == pytest.approx([7.999], abs=1e-12)
     route = initial_route(t, np.outer(2 * t, [1.0, 0.0]), slow(0.0004))
     assert route.speeds == pytest.approx([0.0004])
-
-
-@pytest.mark.parametrize(
-    ("t", "w", "message"),
-    [
-        ([0.0], [[0.0, 0.0]], r"expected \(n,\) and \(n, 2\)"),
-        ([0.0, 1.0], [[0.0, 0.0]], r"t \(2,\) and w \(1, 2\)"),
-        ([0.0, 1.0], [[0.0, 0.0], [np.nan, 0.0]], "finite"),
-        ([0.0, 0.0], [[0.0, 0.0], [1.0, 0.0]], "increase"),
-    ],
-)
-def test_what_is_no_trajectory_is_refused(
-    t: list[float], w: list[list[float]], message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        initial_route(t, w, plan_with())
 
 
 def test_hovers_stay_in_their_radius() -> None:
