@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import FlightPath, Flown, Vehicle
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
 from faao_mav.errors import InputError
 from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.route import Route
@@ -79,35 +80,32 @@ def test_a_flight_is_found_from_any_beginning(
     assert fitted(scheduler, guess).deviation.rms < max(0.6, 0.1 * before)
 
 
-class Counted:
-    """A model that counts its flights, and loses those that are not at 5 m/s if `endless`."""
+def test_a_flight_without_an_end_is_not_the_one_that_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, fly = planned(route_with(SPEEDS, WAITS)), ArduCopter.fly
 
-    def __init__(self, *, endless: bool = False) -> None:
-        self.flights, self._endless = 0, endless
-
-    def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
-        self.flights += 1
-        if self._endless and not np.allclose(path.speeds, 5.0):
+    def followed(model: ArduCopter, path: FlightPath) -> Flown:
+        if not np.allclose(path.speeds, GUESS.speeds):
             raise InputError("the flight would take more than 21600 s")
-        return VEHICLE.flight_model().fly(path, step)
+        return fly(model, path)
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(VEHICLE.flight_model(), name)
-
-
-def test_a_flight_without_an_end_is_not_the_one_that_fits() -> None:
-    endless: Any = Counted(endless=True)
-    scheduler = replace(planned(route_with(SPEEDS, WAITS)), model=endless)
-    assert fitted(scheduler, GUESS).route.speeds == pytest.approx(GUESS.speeds)
+    monkeypatch.setattr(ArduCopter, "fly", followed)
+    assert fitted(plan, GUESS).route.speeds == pytest.approx(GUESS.speeds)
 
 
-def test_a_fit_takes_few_flights() -> None:
-    plan = planned(route_with(SPEEDS, WAITS))
-    before = plan.flight(GUESS).deviation.rms
-    for options, flights, most in (({}, 6, 0.5), ({"flights": 2}, 2, 0.3 * before)):
-        model: Any = Counted()
-        assert fitted(replace(plan, model=model), GUESS, **options).deviation.rms < most
-        assert model.flights <= flights
+def test_a_fit_takes_few_flights(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, fly = planned(route_with(SPEEDS, WAITS)), ArduCopter.fly
+    before, flights = plan.flight(GUESS).deviation.rms, []
+
+    def counted(model: ArduCopter, path: FlightPath) -> Flown:
+        flights.append(path)
+        return fly(model, path)
+
+    monkeypatch.setattr(ArduCopter, "fly", counted)
+    assert fitted(plan, GUESS).deviation.rms < 0.5
+    assert len(flights) <= 6
+    flights.clear()
+    assert fitted(plan, GUESS, flights=2).deviation.rms < 0.3 * before
+    assert len(flights) == 2
 
 
 def test_setting_out_before_the_plan_is_found() -> None:
