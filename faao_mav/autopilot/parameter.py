@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
@@ -105,13 +105,49 @@ def table(*parameters: Parameter) -> ParameterTable:
     return MappingProxyType({parameter.key: parameter for parameter in parameters})
 
 
-def accelerations_to_try(
-    parameter: Parameter, max_acceleration: float, curved: float
-) -> list[float]:
-    """Return values of `parameter` to try for a plan's a_max, m/s², the lowest first.
+def rule(
+    key: str, default: float, name: str, unit: str = "", least: float = -math.inf
+) -> Parameter:
+    """Return a parameter of checks, fence or return, with one name in all generations."""
+    return Parameter(key, unit, default, {name: 1.0}, least, motion=False)
 
-    They are the gentle ones and one for `curved` paths, all within the documented range.
+
+@dataclass(frozen=True, slots=True)
+class Recommended:
+    """The parameters that are recommended for a plan; measured: about 130 flights.
+
+    `curved`, m/s², is the acceleration for corners and short legs at speed, `others` are more
+    parameters by their keys. In one more set, for bends at speed, they are the `liveliest`.
     """
-    low, high = parameter.documented
-    wanted = (*(share * max_acceleration for share in _GENTLE), curved)
-    return sorted({round(min(max(each, low), high), 2) for each in wanted})
+
+    curved: float
+    others: Mapping[str, float] = field(default_factory=dict)
+    liveliest: Mapping[str, float] = field(default_factory=dict)
+
+    def sets(
+        self, table: ParameterTable, speeds: tuple[float, float], max_acceleration: float
+    ) -> tuple[Mapping[str, float], ...]:
+        """Return the sets to try, the gentlest first, for a plan's a_max, m/s².
+
+        `speeds`, m/s, are the greatest of the plan and the greatest that is commanded. Names are
+        those of both generations: a vehicle takes those that it knows.
+        """
+        low, high = table["acceleration"].documented
+        wanted = (*(share * max_acceleration for share in _GENTLE), self.curved)
+        tries = sorted({round(min(max(each, low), high), 2) for each in wanted})
+        tried = [(each, self.others) for each in tries]
+        if self.liveliest:
+            tried.append((tries[-1], self.liveliest))
+        told = {"cruise_speed": speeds[0]}
+        if "max_speed" in table and speeds[1] > table["max_speed"].default:
+            told["max_speed"] = speeds[1]
+        sets = [{**told, "acceleration": a, **others} for a, others in tried]
+        return tuple(
+            {
+                name: table[key].written(value, name)
+                for generation in (-1, 0)
+                for key, value in each.items()
+                for name in [list(table[key].names)[generation]]
+            }
+            for each in sets
+        )

@@ -1,7 +1,7 @@
 """What the rest of the package asks about an autopilot and a type of vehicle."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -12,7 +12,7 @@ from faao_mav.autopilot.failsafe import Failsafe
 from faao_mav.autopilot.manners import FenceAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.model import Model
 from faao_mav.autopilot.orbit import Orbits, RallyRule, no_orbit
-from faao_mav.autopilot.parameter import ParameterTable, ParameterValues
+from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
 
@@ -119,8 +119,7 @@ class VehicleType:
             outside.
         flight_model: how it flies, with the latitude in degrees if that is known; None if
             `unmodelled` says why there is no model: no missions are made for it.
-        recommended: the sets of parameters to try for a plan's greatest speed, m/s, and
-            acceleration, m/s², the gentlest first; one empty set: it flies with its own.
+        recommendation: the parameters that suit plans; None: it flies with its own.
         ceilings: parameters that a plan's "max_speed" or "max_acceleration" may not exceed for the
             vehicle to keep it, beside `fastest`; of angles what they give.
         body: the airframe of the autopilot's simulator, fitted to recorded flights; None where the
@@ -149,13 +148,23 @@ class VehicleType:
     fence_ahead: Callable[[ParameterValues, Real], Real] = lambda _, speed: 0 * speed
     flight_model: Callable[[ParameterValues, float | None], Model] | None = None
     unmodelled: str = ""
-    recommended: Callable[[float, float], Sequence[Mapping[str, float]]] = lambda *_: ({},)
+    recommendation: Recommended | None = None
     ceilings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     body: Body | None = None
     models_wind: bool = False
     failsafes: tuple[Failsafe, ...] = ()
     orbits: Orbits = no_orbit
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
+
+    def recommended(
+        self, max_speed: float, max_acceleration: float
+    ) -> tuple[Mapping[str, float], ...]:
+        """Return the sets of parameters to try for a plan's limits, m/s and m/s²."""
+        if self.recommendation is None:
+            return ({},)
+        speed = min(max_speed, self.fastest)
+        speeds = speed, round(min(OVERSPEED * speed, self.fastest), 2)
+        return self.recommendation.sets(self.parameters, speeds, max_acceleration)
 
     def defaults(self) -> dict[str, float]:
         """Return the defaults by the autopilot's oldest names, in the autopilot's own units.

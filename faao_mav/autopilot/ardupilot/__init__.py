@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from faao_mav.arrays import Real
 from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule
-from faao_mav.autopilot.parameter import Parameter, ParameterValues
+from faao_mav.autopilot.parameter import ParameterValues, rule
 from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse
 from faao_mav.geodesy import LocalFrame
 
@@ -120,38 +120,20 @@ def at_fence(actions: Mapping[int, FenceAction]) -> Callable[[ParameterValues], 
     return response
 
 
-def switch(key: str, default: float, name: str, unit: str = "") -> Parameter:
-    """Return a parameter of checks, fence or return, with one name in all generations."""
-    return Parameter(key, unit, default, {name: 1.0}, motion=False)
-
-
 SHARED = (
-    switch("arming_items", 0, "ARMING_MIS_ITEMS"),
-    switch("fence_enable", 0, "FENCE_ENABLE"),
-    switch("fence_action", 1, "FENCE_ACTION"),
-    switch("fence_margin", 2.0, "FENCE_MARGIN", "m"),
-    switch("fence_ceiling", 100.0, "FENCE_ALT_MAX", "m"),
-    switch("fence_floor", -10.0, "FENCE_ALT_MIN", "m"),
-    switch("fence_radius", 300.0, "FENCE_RADIUS", "m"),
-    switch("sd_storage", 0, "BRD_SD_MISSION"),
-    switch("terrain_enable", 1, "TERRAIN_ENABLE"),
-    switch("mission_options", 0, "MIS_OPTIONS"),
+    rule("arming_items", 0, "ARMING_MIS_ITEMS"),
+    rule("fence_enable", 0, "FENCE_ENABLE"),
+    rule("fence_action", 1, "FENCE_ACTION"),
+    rule("fence_margin", 2.0, "FENCE_MARGIN", "m"),
+    rule("fence_ceiling", 100.0, "FENCE_ALT_MAX", "m"),
+    rule("fence_floor", -10.0, "FENCE_ALT_MIN", "m"),
+    rule("fence_radius", 300.0, "FENCE_RADIUS", "m"),
+    rule("sd_storage", 0, "BRD_SD_MISSION"),
+    rule("terrain_enable", 1, "TERRAIN_ENABLE"),
+    rule("mission_options", 0, "MIS_OPTIONS"),
 )
 """Arming, fence, storage and terrain. Each vehicle has defaults of its own for FENCE_OPTIONS and
 FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor. Source: ArduPilot 4.7."""
-
-
-def rally_parameters(limit: float, home: float) -> tuple[Parameter, ...]:
-    """Return what decides between home and rally points, with these defaults.
-
-    `rally_limit` is how far the autopilot looks for a rally point, m, 0: any distance;
-    `rally_home` whether home is one of the places to choose from.
-    """
-    names = {"RALLY_LIMIT_KM": 1000.0}
-    return (
-        Parameter("rally_limit", "m", limit, names, motion=False),
-        switch("rally_home", home, "RALLY_INCL_HOME"),
-    )
 
 
 def rally_rule(vehicle: ParameterValues) -> RallyRule:

@@ -8,7 +8,6 @@ read at several revisions about 1.16; controller gains are PX4's documented defa
 """
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -17,13 +16,12 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
 from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
-from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
+from faao_mav.autopilot.parameter import ParameterValues, Recommended
 from faao_mav.autopilot.px4.dialect import DIALECT
 from faao_mav.autopilot.px4.failsafes import FAILSAFES
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
 from faao_mav.autopilot.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.autopilot.vehicle_type import (
-    OVERSPEED,
     AutopilotFamily,
     FenceResponse,
     VehicleType,
@@ -142,34 +140,9 @@ def _fence_ahead(vehicle: ParameterValues, speed: Real) -> Real:
 _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (the documented maximum of MPC_XY_CRUISE)."""
 
-_CURVED_ACCELERATION = 5.0
-"""The recommended acceleration for corners and short legs at speed, m/s². Measured: about 130
-flights."""
-
-_JERK = 20.0
-"""The recommended jerk, m/s³. Measured: about 130 flights."""
-
 _ERROR_LIMIT, _HEIGHT_RADIUS = 10.0, 3.0
 """The recommended MPC_XY_ERR_MAX and NAV_MC_ALT_RAD, m. Measured: with the default of 2 m progress
 slows whenever the aircraft lags; with that of 0.8 m it missed waypoints for their altitude."""
-
-
-def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
-    speed = min(max_speed, _FASTEST)
-    top = round(min(OVERSPEED * speed, _FASTEST), 2)
-    table = COPTER_TABLE
-    for acceleration in accelerations_to_try(
-        table["acceleration"], max_acceleration, _CURVED_ACCELERATION
-    ):
-        values = {
-            "cruise_speed": speed,
-            **({"max_speed": top} if top > table["max_speed"].default else {}),
-            "acceleration": acceleration,
-            "jerk": _JERK,
-            "error_limit": _ERROR_LIMIT,
-            "height_radius": _HEIGHT_RADIUS,
-        }
-        yield {table[key].newest_name: value for key, value in values.items()}
 
 
 def _rally(vehicle: ParameterValues) -> RallyRule:
@@ -197,7 +170,9 @@ PX4_COPTER = VehicleType(
     fence_ahead=_fence_ahead,
     fastest=_FASTEST,
     flight_model=Px4.from_vehicle,
-    recommended=lambda *limits: tuple(_recommended(*limits)),
+    recommendation=Recommended(
+        5.0, {"jerk": 20.0, "error_limit": _ERROR_LIMIT, "height_radius": _HEIGHT_RADIUS}
+    ),
     ceilings={"max_speed": ("max_speed",), "max_acceleration": ("lean_angle", "acceleration")},
     body=PX4_BODY,
     rally=_rally,

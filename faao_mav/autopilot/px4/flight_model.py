@@ -52,14 +52,9 @@ _RADIUS_SHARE = 0.45
 """The greatest acceptance radius as a share of the shorter leg at the waypoint. Chosen below 0.5,
 so that the circles of two waypoints do not meet; a radius as long as its leg counts at once."""
 
-_CUT, _CUT_WITH_HIGH_JERK = 1.3, 1.0
-"""How much of a corner a wide acceptance radius may cut, m: the second from `_HIGH_JERK` on, where
-an aircraft is soon at speed again and loses less in a corner. Chosen; what a change costs is not
+_CUT = 1.0
+"""How much of a corner a wide acceptance radius may cut, m. Chosen; what a change costs is not
 measured."""
-
-_HIGH_JERK = 10.0
-"""The jerk from which corners cost little time, m/s³: between the default of 4 and the recommended
-20. Chosen; what a change costs is not measured."""
 
 _LEAST_LEG = 5.0
 """The least length of a leg, m: two acceptance radii with which an aircraft half a metre off is in
@@ -116,8 +111,7 @@ class Px4(Px4Limits):
         wider than the next: PX4 would first fly back to the waypoint. `stops` (n,)
         marks waypoints at which it waits: those are left from within.
         """
-        most_cut = _CUT if self.jerk < _HIGH_JERK else _CUT_WITH_HIGH_JERK
-        cut = most_cut / np.maximum(np.tan(turn / 4), 1e-9)
+        cut = _CUT / np.maximum(np.tan(turn / 4), 1e-9)
         wide = np.where(stops, _RADIUS, np.maximum(_RADIUS, cut))
         radii = np.maximum(np.minimum(wide, _RADIUS_SHARE * room), _LEAST_RADIUS)
         for k in reversed(np.flatnonzero((turn > _STRAIGHT) & ~stops)):

@@ -4,12 +4,12 @@ Source: PX4 1.16, parameter reference.
 """
 
 from dataclasses import dataclass
-from math import inf, radians
+from math import radians
 from typing import Any
 
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
-from faao_mav.autopilot.parameter import Parameter, table
+from faao_mav.autopilot.parameter import Parameter, rule, table
 
 
 def _own(unit: str, default: float, name: str, least: float = 0.1, **more: Any) -> Any:
@@ -25,20 +25,16 @@ def _angle(key: str, degrees: float, name: str, least: float, greatest: float) -
     return Parameter(key, "rad", radians(degrees), {name: radians(1)}, *limits)
 
 
-def _rule(key: str, unit: str, default: float, name: str, least: float = -inf) -> Parameter:
-    return Parameter(key, unit, default, {name: 1.0}, least, motion=False)
-
-
 _SHARED = (
-    _rule("takeoff_land_required", "", 0, "MIS_TKO_LAND_REQ"),
-    _rule("first_waypoint_distance", "m", 10_000.0, "MIS_DIST_1WP"),
-    _rule("takeoff_height", "m", 2.5, "MIS_TAKEOFF_ALT"),
-    _rule("fence_action", "", 2, "GF_ACTION"),
-    _rule("fence_predict", "", 0, "GF_PREDICT"),
-    _rule("fence_distance", "m", 0.0, "GF_MAX_HOR_DIST"),
-    _rule("fence_height", "m", 0.0, "GF_MAX_VER_DIST"),
-    _rule("return_height", "m", 60.0, "RTL_RETURN_ALT", 0.0),
-    _rule("return_type", "", 0, "RTL_TYPE"),
+    rule("takeoff_land_required", 0, "MIS_TKO_LAND_REQ"),
+    rule("first_waypoint_distance", 10_000.0, "MIS_DIST_1WP", "m"),
+    rule("takeoff_height", 2.5, "MIS_TAKEOFF_ALT", "m"),
+    rule("fence_action", 2, "GF_ACTION"),
+    rule("fence_predict", 0, "GF_PREDICT"),
+    rule("fence_distance", 0.0, "GF_MAX_HOR_DIST", "m"),
+    rule("fence_height", 0.0, "GF_MAX_VER_DIST", "m"),
+    rule("return_height", 60.0, "RTL_RETURN_ALT", "m", 0.0),
+    rule("return_type", 0, "RTL_TYPE"),
 )
 """Mission checks, fence and return."""
 

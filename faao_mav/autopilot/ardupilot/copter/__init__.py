@@ -1,7 +1,6 @@
 """ArduCopter: what it is, and how it flies a mission."""
 
 import math
-from collections.abc import Iterator, Mapping
 
 from faao_mav.autopilot.ardupilot import (
     ARDUPILOT,
@@ -17,7 +16,7 @@ from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
-from faao_mav.autopilot.parameter import ParameterValues, accelerations_to_try
+from faao_mav.autopilot.parameter import ParameterValues, Recommended
 from faao_mav.autopilot.vehicle_type import VehicleType
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
@@ -25,18 +24,10 @@ from faao_mav.mission.item import MissionItem
 _FASTEST = 20.0
 """The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""
 
-_CURVED_ACCELERATION = 4.0
-"""The recommended acceleration for corners and short legs at speed, m/s². Measured: about 130
-flights."""
-
-_JERK = 10.0
-"""The recommended jerk, m/s³. Measured: about 130 flights."""
-
-_LIVELIEST_JERK = 20.0
-"""The jerk, m/s³, for bends at speed, with the greatest acceleration: its documented maximum.
-Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5, with a jerk of 10
-4.4."""
-
+_JERK, _LIVELIEST_JERK = 10.0, 20.0
+"""The recommended jerk, m/s³, and the one for bends at speed, with the greatest acceleration: its
+documented maximum. Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5,
+with a jerk of 10 4.4."""
 
 _BRAKE = 17
 _MODES = Modes(
@@ -49,20 +40,6 @@ _MODES = Modes(
 )
 """COPTER_MODE of MAVLink. ArduCopter 4.7 does not arm in RTL, CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE,
 SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
-
-
-def _recommended(max_speed: float, max_acceleration: float) -> Iterator[Mapping[str, float]]:
-    """Yield sets with the names of both generations: a vehicle takes those that it knows."""
-    speed = min(max_speed, _FASTEST)
-    accelerations = accelerations_to_try(
-        TABLE["acceleration"], max_acceleration, _CURVED_ACCELERATION
-    )
-    tried = [(acceleration, _JERK) for acceleration in accelerations]
-    for acceleration, jerk in (*tried, (accelerations[-1], _LIVELIEST_JERK)):
-        values = {"cruise_speed": speed, "acceleration": acceleration, "jerk": jerk}
-        old = {TABLE[key].oldest_name: (key, value) for key, value in values.items()}
-        new = {TABLE[key].newest_name: (key, value) for key, value in values.items()}
-        yield {name: TABLE[key].written(value, name) for name, (key, value) in (old | new).items()}
 
 
 def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
@@ -104,7 +81,7 @@ ARDUCOPTER = VehicleType(
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
     failsafes=COPTER_FAILSAFES,
     flight_model=ArduCopter.from_vehicle,
-    recommended=lambda *limits: tuple(_recommended(*limits)),
+    recommendation=Recommended(4.0, {"jerk": _JERK}, {"jerk": _LIVELIEST_JERK}),
     ceilings={"max_acceleration": ("lean_angle", "acceleration")},
     body=ARDUCOPTER_BODY,
     models_wind=True,

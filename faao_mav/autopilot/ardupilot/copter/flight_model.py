@@ -68,11 +68,12 @@ class ArduCopter(ArduCopterLimits):
         """Return the predicted flight along `path`, sampled every `step` seconds.
 
         The flight begins in a hover, nose to the north, held against the wind by the integral.
-        Raises `InputError` for speeds that are not positive, for what is not finite, and for a
-        flight that takes more than `path.longest`.
+        Raises `InputError` for speeds that are not positive and finite, and for a flight that takes
+        more than `path.longest`.
         """
         waits = np.floor(path.holds) + path.delays
-        _check(path, waits, step)
+        if not np.all(np.isfinite(path.speeds) & (path.speeds > 0)):
+            raise InputError("flight path: expected speeds above 0")
         stopping = waits > 0
         stopping[[0, -1]] = True
         scale = np.array([self.east_metre, self.north_metre, 1.0])
@@ -189,11 +190,3 @@ class _Controller:
         across = min(self._lean, max(-self._lean, turned.imag))
         most = math.sqrt(self._lean**2 - across**2)
         return complex(min(most, max(-most, turned.real)), across) * way
-
-
-def _check(path: FlightPath, waits: Real, step: float) -> None:
-    finite = all(np.all(np.isfinite(values)) for values in (path.points, path.speeds, waits))
-    if not (finite and np.all(path.speeds > 0) and np.all(waits >= 0) and step > 0):
-        raise InputError(
-            "flight path: expected finite points, speeds and steps above 0, and holds of 0 or more"
-        )

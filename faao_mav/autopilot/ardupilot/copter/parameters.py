@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from math import radians
 from typing import Any, Self
 
-from faao_mav.autopilot.ardupilot import DEGREE, SHARED, rally_parameters, switch
+from faao_mav.autopilot.ardupilot import DEGREE, SHARED
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
-from faao_mav.autopilot.parameter import Parameter, ParameterValues, table
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, rule, table
 from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.power import GRAVITY
 
@@ -104,11 +104,12 @@ TABLE = table(
     Parameter("landing_speed", "m/s", 0.5, {"LAND_SPD_MS": 1.0, "LAND_SPEED": 0.01}, 0.05),
     Parameter("return_height", "m", 15.0, {"RTL_ALT_M": 1.0, "RTL_ALT": 0.01}, 0.0, motion=False),
     *SHARED,
-    switch("fence_options", 0, "FENCE_OPTIONS"),
-    switch("fence_type", 7, "FENCE_TYPE"),
+    rule("fence_options", 0, "FENCE_OPTIONS"),
+    rule("fence_type", 7, "FENCE_TYPE"),
     Parameter("circle_radius", "m", 10.0, {"CIRCLE_RADIUS_M": 1.0, "CIRCLE_RADIUS": 0.01}, 0.0),
     Parameter("circle_rate", "rad/s", radians(20), {"CIRCLE_RATE": radians(1)}),
-    *rally_parameters(limit=300.0, home=1),
+    Parameter("rally_limit", "m", 300.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
+    rule("rally_home", 1, "RALLY_INCL_HOME"),
 )
 """ArduCopter's parameters."""
 

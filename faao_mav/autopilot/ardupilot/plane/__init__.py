@@ -6,9 +6,7 @@ from faao_mav.autopilot.ardupilot import (
     SHARED,
     at_fence,
     needs_one_inclusion,
-    rally_parameters,
     rally_rule,
-    switch,
 )
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
@@ -16,7 +14,7 @@ from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPla
 from faao_mav.autopilot.body import ARDUPLANE_BODY
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
-from faao_mav.autopilot.parameter import Parameter, table
+from faao_mav.autopilot.parameter import Parameter, rule, table
 from faao_mav.autopilot.vehicle_type import VehicleType
 
 _LOITER, _RTL = 12, 11
@@ -31,10 +29,11 @@ _TABLE = table(
         "return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0, motion=False
     ),
     *SHARED,
-    switch("fence_options", 1, "FENCE_OPTIONS"),
-    switch("fence_type", 4, "FENCE_TYPE"),
-    switch("return_lands", 0, "RTL_AUTOLAND"),
-    *rally_parameters(limit=5000.0, home=0),
+    rule("fence_options", 1, "FENCE_OPTIONS"),
+    rule("fence_type", 4, "FENCE_TYPE"),
+    rule("return_lands", 0, "RTL_AUTOLAND"),
+    Parameter("rally_limit", "m", 5000.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
+    rule("rally_home", 0, "RALLY_INCL_HOME"),
 )
 """ArduPlane's parameters. A negative `loiter_radius` turns left; a `return_height` below 0 keeps
 the height at which the return begins."""
