@@ -96,59 +96,44 @@ class SpeedChange:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dialect:
-    """How one autopilot takes missions.
+    """How one autopilot takes missions."""
 
-    Attributes:
-        name: what takes them, as messages say it.
-        home_row: item 0 on the wire is home, which the vehicle replaces by its own.
-        items: how many items fit, the home row included.
-        jumps: how many DO_JUMPs keep count of their repeats; None: all.
-        fence_rows, rally_rows: how many vertices and circles, and how many rally points, fit on
-            the smallest boards in common use.
-        atomic: a refused upload leaves the old mission as it was.
-        unset_is_zero: it refuses most parameters that are not set (NaN), and is sent 0 instead.
-        zero_means_here: latitude and longitude 0, 0 stand for the place where the vehicle is.
-        placed, unplaced: the commands that it takes with a place and without one, with what is
-            stored of their parameters; what has no place is stored at 0, 0, 0 unless it
-            `keeps_idle` numbers.
-        frames, idle_frames: the frames in which it takes those and these, and in which it gives
-            them back.
-        may_be_unset: where NaN is refused, the parameters, from 0, of commands that may be NaN.
-        altitude, fence_altitude, rally_altitude: what is stored of the altitude of an item, of a
-            row of the fence and of a rally point.
-        highest: the altitude, m, from which on items are refused; None: none is.
-        always_continues: it stores no autocontinue, which reads back as true.
-        speed_change: what a DO_CHANGE_SPEED changes, None for one that changes nothing.
-        unlimited: whether the vehicle's parameters make room for any number of items, and
-            `make_room` how to set them so.
-        endings: the commands behind which nothing is flown.
-        flies_on: whether, by the vehicle's parameters, a take-off behind a landing is flown.
-    """
-
-    name: str
-    home_row: bool
-    items: Limit
-    jumps: Limit | None
+    name: str  # What takes them, as messages say it
+    home_row: bool  # Item 0 on the wire is home, which the vehicle replaces by its own
+    items: Limit  # How many items fit, the home row included
+    jumps: Limit | None  # How many DO_JUMPs keep count of their repeats; None: all
+    # How many vertices and circles, and how many rally points, fit on the smallest boards in common
+    # use
     fence_rows: int
     rally_rows: int
-    atomic: bool
-    unset_is_zero: bool
-    zero_means_here: bool
+    atomic: bool  # A refused upload leaves the old mission as it was
+    unset_is_zero: bool  # It refuses most parameters that are not set (NaN), and is sent 0 instead
+    zero_means_here: bool  # Latitude and longitude 0, 0 stand for the place where the vehicle is
+    # The commands that it takes with a place and without one, with what is stored of their
+    # parameters; what has no place is stored at 0, 0, 0 unless it `keeps_idle` numbers
     placed: Mapping[int, Codecs]
     unplaced: Mapping[int, Codecs]
+    # The frames in which it takes those and these, and in which it gives them back
     frames: Mapping[int, int]
     idle_frames: Mapping[int, int]
+    # What a DO_CHANGE_SPEED changes, None for one that changes nothing
     speed_change: Callable[[MissionItem], SpeedChange | None]
+    # Where NaN is refused, the parameters, from 0, of commands that may be NaN
     may_be_unset: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    # What is stored of the altitude of an item, of a row of the fence and of a rally point
     altitude: Codec = single
     fence_altitude: Codec = single
     rally_altitude: Codec = single
-    highest: float | None = None
-    always_continues: bool = False
+    highest: float | None = None  # The altitude, m, from which on items are refused; None: none is
+    always_continues: bool = False  # It stores no autocontinue, which reads back as true
     keeps_idle: bool = True
+    # Whether the vehicle's parameters make room for any number of items, and `make_room` how to set
+    # them so
     unlimited: Callable[[ParameterValues], bool] = lambda _: False
     make_room: str = ""
+    # The commands behind which nothing is flown
     endings: frozenset[int] = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
+    # Whether, by the vehicle's parameters, a take-off behind a landing is flown
     flies_on: Callable[[ParameterValues], bool] = lambda _: False
 
     @property

@@ -18,23 +18,18 @@ class Response:
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """What a vehicle does by the value of the parameter `decides`.
-
-    Attributes:
-        does: what it does by that value, from 1 on; "" for what is not known. Names in braces stand
-            for the values of parameters.
-        idle: the values with which it does nothing, or goes on with its mission.
-        after: the parameter that says after how many seconds it acts.
-        below: parameters below which it acts, 0 for none, with their units.
-        when: when that is, as the beginning of what it does.
-    """
+    """What a vehicle does by the value of the parameter `decides`."""
 
     decides: str
+    # What it does by that value, from 1 on; "" for what is not known. Names in braces stand for the
+    # values of parameters
     does: Sequence[str]
+    # The values with which it does nothing, or goes on with its mission
     idle: Collection[int] = (0,)
-    after: str = ""
+    after: str = ""  # The parameter that says after how many seconds it acts
+    # Parameters below which it acts, 0 for none, with their units
     below: Mapping[str, str] = field(default_factory=dict)
-    when: str = ""
+    when: str = ""  # When that is, as the beginning of what it does
 
     def told(self, values: Values) -> Response:
         """Return what it does by `values`; nothing to tell where none of its limits is set."""
@@ -56,24 +51,20 @@ class Action:
 
 @dataclass(frozen=True, slots=True)
 class Failsafe:
-    """What a vehicle does when `loss`, the beginning of a sentence, happens in flight.
-
-    Attributes:
-        defaults: the parameters that decide, with the autopilot's defaults; a whole number is one
-            of 32 bits on PX4's wire.
-        actions: what it does, by its parameters; without any it always does what `always` says.
-        off: the values of parameters with which it does nothing.
-        exceptions: the parameter, and its bits in a mission and in a flight by setpoints, by which
-            it flies on.
-        absent: the values that count in versions that lack the parameter.
-    """
+    """What a vehicle does when `loss`, the beginning of a sentence, happens in flight."""
 
     loss: str
+    # The parameters that decide, with the autopilot's defaults; a whole number is one of 32 bits on
+    # PX4's wire
     defaults: Values
+    # What it does, by its parameters; without any it always does what `always` says
     actions: tuple[Action, ...] = ()
     always: str = ""
+    # The values of parameters with which it does nothing
     off: Mapping[str, Collection[float]] = field(default_factory=dict)
+    # The parameter, and its bits in a mission and in a flight by setpoints, by which it flies on
     exceptions: tuple[str, int, int] | None = None
+    # The values that count in versions that lack the parameter
     absent: Values = field(default_factory=dict)
 
     def told(self, values: Values, *, streamed: bool) -> Response | None:

@@ -69,31 +69,26 @@ class LossAction(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SetpointRules:
-    """The rules of an autopilot for flights by setpoints.
+    """The rules of an autopilot for flights by setpoints."""
 
-    Attributes:
-        timeout: the parameter that says for how many seconds it does without setpoints; "": it is
-            not flown by them.
-        least_timeout: the least time, s, whatever that parameter says.
-        most_timeout: the longest time, s, with which it is flown by setpoints.
-        loss: the parameter that says which of `actions`, by their values, it then does; "": it
-            stops in its place, and stays in its mode.
-        forbidden: the values of that parameter with which it is not flown so, and what they do.
-        streamed: for so many seconds setpoints have to come before it enters the mode; it then
-            takes off by them. 0: it enters the mode at any time, and takes off by a command.
-        carries_on: it goes on from a setpoint by the velocity and the acceleration in it; else it
-            goes to where the setpoint is, and waits there for the next.
-        defaults: the values of these parameters that it comes with.
-    """
-
+    # The parameter that says for how many seconds it does without setpoints; "": it is not flown by
+    # them
     timeout: str = ""
-    least_timeout: float = 0.0
-    most_timeout: float = math.inf
+    least_timeout: float = 0.0  # The least time, s, whatever that parameter says
+    most_timeout: float = math.inf  # The longest time, s, with which it is flown by setpoints
+    # The parameter that says which of `actions`, by their values, it then does; "": it stops in its
+    # place, and stays in its mode
     loss: str = ""
     actions: Mapping[float, LossAction] = field(default_factory=dict)
+    # The values of that parameter with which it is not flown so, and what they do
     forbidden: Mapping[float, str] = field(default_factory=dict)
+    # For so many seconds setpoints have to come before it enters the mode; it then takes off by
+    # them. 0: it enters the mode at any time, and takes off by a command
     streamed: float = 0.0
+    # It goes on from a setpoint by the velocity and the acceleration in it; else it goes to where
+    # the setpoint is, and waits there for the next
     carries_on: bool = False
+    # The values of these parameters that it comes with
     defaults: dict[str, float] = field(default_factory=dict)
 
     @property

@@ -43,37 +43,28 @@ def custom_mode(mode: int) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AutopilotFamily:
-    """An autopilot, whatever it flies.
+    """An autopilot, whatever it flies."""
 
-    Attributes:
-        key: its name in plans and options.
-        name: the name that is shown.
-        mav_autopilot: its MAV_AUTOPILOT number on the wire and in `.plan` files.
-        parameter_suffix: what its parameter files end in.
-        parameter_style: "list" has lines of NAME,VALUE, "qgroundcontrol" five fields between tabs.
-        parameter_prefixes: parameters whose names begin with one of these are its own.
-        manners: how it takes and gives lists; those of one that is not known by default.
-        mode_parameters: the first three parameters of DO_SET_MODE for one of its custom modes.
-        setpoints: how it is flown by setpoints.
-        local_frame: the frame in which it takes them, about its origin in degrees.
-        whole_as_bits: whole numbers among its parameters are sent as their 32 bits, and only what
-            is sent with the right type is set.
-        mavlink_2: the parameter and its value with which a port speaks MAVLink 2.
-        only_one_station: what may be why it does not answer, and what to do; "": nothing is known.
-    """
-
-    key: Autopilot
-    name: str
-    mav_autopilot: int
-    parameter_suffix: str
+    key: Autopilot  # Its name in plans and options
+    name: str  # The name that is shown
+    mav_autopilot: int  # Its MAV_AUTOPILOT number on the wire and in `.plan` files
+    parameter_suffix: str  # What its parameter files end in
+    # "list" has lines of NAME,VALUE, "qgroundcontrol" five fields between tabs
     parameter_style: Literal["list", "qgroundcontrol"]
+    # Parameters whose names begin with one of these are its own
     parameter_prefixes: tuple[str, ...]
+    # How it takes and gives lists; those of one that is not known by default
     manners: Manners = field(default_factory=Manners)
+    # The first three parameters of DO_SET_MODE for one of its custom modes
     mode_parameters: Callable[[int], tuple[float, float, float]] = custom_mode
-    setpoints: SetpointRules = field(default_factory=SetpointRules)
+    setpoints: SetpointRules = field(default_factory=SetpointRules)  # How it is flown by setpoints
+    # The frame in which it takes them, about its origin in degrees
     local_frame: Callable[[float, float], LocalFrame] = LocalFrame
+    # Whole numbers among its parameters are sent as their 32 bits, and only what is sent with the
+    # right type is set
     whole_as_bits: bool = False
-    mavlink_2: str = ""
+    mavlink_2: str = ""  # The parameter and its value with which a port speaks MAVLink 2
+    # What may be why it does not answer, and what to do; "": nothing is known
     only_one_station: str = ""
 
 
@@ -96,64 +87,45 @@ class FenceResponse:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VehicleType:
-    """One autopilot flying one type of vehicle: what is true of all of them.
+    """One autopilot flying one type of vehicle: what is true of all of them."""
 
-    Attributes:
-        family: the autopilot.
-        kind: the type of vehicle as plans and options name it.
-        name: the name that is shown, as "ArduCopter".
-        mav_types: its MAV_TYPE numbers; the first is written into `.plan` files and heartbeats.
-        modes: its flight modes.
-        hovers: it can stand still in the air; else it circles to wait.
-        whole_second_holds: the hold of a waypoint loses its fraction of a second.
-        parameters: its parameters by key.
-        dialect: what it does with the items of a mission.
-        fastest: the greatest speed that it can be told, m/s.
-        spool: how long a take-off takes before it climbs, s.
-        returns_at_least: a return never descends for the height of returns.
-        fence_needs_one_inclusion: being inside one of several inclusion areas is enough; else the
-            vehicle has to be inside all.
-        home_outside_fence: what it does with a mission where home lies outside the fence.
-        at_fence: what it does when it leaves the areas of its fence.
-        fence_ahead: how far ahead, m, it looks for its fence at a speed, m/s; 0: it acts when it is
-            outside.
-        flight_model: how it flies, with the latitude in degrees if that is known; None if
-            `unmodelled` says why there is no model: no missions are made for it.
-        recommendation: the parameters that suit plans; None: it flies with its own.
-        ceilings: parameters that a plan's "max_speed" or "max_acceleration" may not exceed for the
-            vehicle to keep it, beside `fastest`; of angles what they give.
-        body: the airframe of the autopilot's simulator, fitted to recorded flights; None where the
-            model is compared with none.
-        models_wind: its flight model flies in wind: what hovers in more than it can hold as well.
-        orbits: how it circles at an item.
-        rally: where a return goes when there are rally points.
-        failsafes: what it does by itself on a loss.
-    """
-
-    family: AutopilotFamily
-    kind: Kind
-    name: str
+    family: AutopilotFamily  # The autopilot
+    kind: Kind  # The type of vehicle as plans and options name it
+    name: str  # The name that is shown, as "ArduCopter"
+    # Its MAV_TYPE numbers; the first is written into `.plan` files and heartbeats
     mav_types: tuple[int, ...]
-    modes: Modes
-    hovers: bool
-    parameters: ParameterTable
-    dialect: Dialect
-    spool: float = 2.0
-    returns_at_least: bool = True
-    whole_second_holds: bool = False
-    fastest: float = 20.0
+    modes: Modes  # Its flight modes
+    hovers: bool  # It can stand still in the air; else it circles to wait
+    parameters: ParameterTable  # Its parameters by key
+    dialect: Dialect  # What it does with the items of a mission
+    spool: float = 2.0  # How long a take-off takes before it climbs, s
+    returns_at_least: bool = True  # A return never descends for the height of returns
+    whole_second_holds: bool = False  # The hold of a waypoint loses its fraction of a second
+    fastest: float = 20.0  # The greatest speed that it can be told, m/s
+    # Being inside one of several inclusion areas is enough; else the vehicle has to be inside all
     fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True
-    home_outside_fence: str = ""
+    home_outside_fence: str = ""  # What it does with a mission where home lies outside the fence
+    # What it does when it leaves the areas of its fence
     at_fence: Callable[[ParameterValues], FenceResponse] = lambda _: FenceResponse("nothing", "")
+    # How far ahead, m, it looks for its fence at a speed, m/s; 0: it acts when it is outside
     fence_ahead: Callable[[ParameterValues, Real], Real] = lambda _, speed: 0 * speed
+    # How it flies, with the latitude in degrees if that is known; None if `unmodelled` says why
+    # there is no model: no missions are made for it
     flight_model: Callable[[ParameterValues, float | None], Model] | None = None
     unmodelled: str = ""
+    # The parameters that suit plans; None: it flies with its own
     recommendation: Recommended | None = None
+    # Parameters that a plan's "max_speed" or "max_acceleration" may not exceed for the vehicle to
+    # keep it, beside `fastest`; of angles what they give
     ceilings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    # The airframe of the autopilot's simulator, fitted to recorded flights; None where the model is
+    # compared with none
     body: Body | None = None
+    # Its flight model flies in wind: what hovers in more than it can hold as well
     models_wind: bool = False
-    failsafes: tuple[Failsafe, ...] = ()
-    orbits: Orbits = no_orbit
+    failsafes: tuple[Failsafe, ...] = ()  # What it does by itself on a loss
+    orbits: Orbits = no_orbit  # How it circles at an item
+    # Where a return goes when there are rally points
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
 
     def recommended(
