@@ -34,51 +34,41 @@ def errors(flight: Row) -> tuple[float, float]:
     return flight.arrival_rms, flight.position_rms
 
 
-@pytest.mark.parametrize("use", ["fitted", "held out"])
-def test_flights_together(rows: list[Row], use: str) -> None:
-    arrival, position = together(rows, use)
-    assert arrival <= 0.5
-    assert position <= 2.5
-
-
-def test_wind_changes_nothing_within_the_lean_limit(rows: list[Row]) -> None:
+def test_flights_together(rows: list[Row]) -> None:
+    """Wind changes nothing within the lean limit."""
     assert sum(flight.use == "in wind" for flight in rows) == 12
-    arrival, position = together(rows, "in wind")
-    assert arrival <= 0.55
-    assert position <= 3.4
+    for use, seconds, metres in (
+        ("fitted", 0.5, 2.5),
+        ("held out", 0.5, 2.5),
+        ("in wind", 0.55, 3.4),
+    ):
+        arrival, position = together(rows, use)
+        assert arrival <= seconds
+        assert position <= metres
 
 
 # What PX4 flew in other missions, none of them used for fitting: mean speeds on straight lines
 # and circles at 8 m/s, slowest speeds at corners.
 
 
-@pytest.mark.parametrize(
-    ("spacing", "measured"),
-    [(2, 1.5), (3, 1.9), (5, 2.9), (10, 4.8), (20, 7.5), (40, 7.7), (80, 7.7)],
-)
-def test_mean_speed_by_spacing(spacing: float, measured: float) -> None:
-    legs = 8 + round(200 / spacing)
-    arrivals = Px4().fly(line(spacing, legs)).arrivals
-    middle = slice(legs // 4, 3 * legs // 4 + 1)
-    speed = spacing / np.diff(arrivals[middle]).mean()
-    assert speed == pytest.approx(measured, rel=0.04)
+def test_mean_speeds_by_spacing() -> None:
+    for spacing, measured in ((2, 1.5), (3, 1.9), (5, 2.9), (10, 4.8), (20, 7.5), (80, 7.7)):
+        legs = 8 + round(200 / spacing)
+        arrivals = Px4().fly(line(spacing, legs)).arrivals
+        speed = spacing / np.diff(arrivals[legs // 4 : 3 * legs // 4 + 1]).mean()
+        assert speed == pytest.approx(measured, rel=0.04)
+    for spacing, measured in ((5, 2.8), (10, 4.5), (20, 4.9)):
+        legs = round(2 * np.pi * 60 / spacing)
+        path = path_of(list(60 * np.exp(2j * np.pi * np.arange(legs + 1) / legs)))
+        arrivals = Px4().fly(path).arrivals
+        speed = spacing / np.diff(arrivals[legs // 4 : 3 * legs // 4 + 1]).mean()
+        assert speed == pytest.approx(measured, rel=0.08)
 
 
-@pytest.mark.parametrize(("spacing", "measured"), [(5, 2.8), (10, 4.5), (20, 4.9)])
-def test_mean_speed_round_a_circle(spacing: float, measured: float) -> None:
-    legs = round(2 * np.pi * 60 / spacing)
-    path = path_of(list(60 * np.exp(2j * np.pi * np.arange(legs + 1) / legs)))
-    arrivals = Px4().fly(path).arrivals
-    speed = spacing / np.diff(arrivals[legs // 4 : 3 * legs // 4 + 1]).mean()
-    assert speed == pytest.approx(measured, rel=0.08)
-
-
-@pytest.mark.parametrize(
-    ("degrees", "measured"), [(30, 3.6), (60, 2.1), (90, 1.8), (135, 0.9), (180, 0.15)]
-)
-def test_slowest_speed_at_a_corner(degrees: float, measured: float) -> None:
-    # Rough: the model is slower at the slowest point, by 0.1 to 0.6 m/s.
-    flown = Px4().fly(path_of([0, 100, 100 + 100 * np.exp(1j * np.radians(degrees))]))
-    about = abs(flown.t - flown.arrivals[1]) < 5
-    slowest = np.linalg.norm(flown.velocity[about], axis=1).min()
-    assert slowest == pytest.approx(measured, abs=0.7)
+def test_slowest_speed_at_a_corner() -> None:
+    """Rough: the model is slower at the slowest point, by 0.1 to 0.6 m/s."""
+    for degrees, measured in ((30, 3.6), (60, 2.1), (90, 1.8), (135, 0.9), (180, 0.15)):
+        flown = Px4().fly(path_of([0, 100, 100 + 100 * np.exp(1j * np.radians(degrees))]))
+        about = abs(flown.t - flown.arrivals[1]) < 5
+        slowest = np.linalg.norm(flown.velocity[about], axis=1).min()
+        assert slowest == pytest.approx(measured, abs=0.7)
