@@ -1,9 +1,9 @@
 """Where items are: their heights, circles, and where a return goes when there are rally points."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -63,10 +63,6 @@ Orbits: TypeAlias = Callable[[ParameterValues, MissionItem], Orbit | None]
 """How a vehicle circles at an item, None where it does not."""
 
 
-def no_orbit(vehicle: ParameterValues, item: MissionItem) -> None:
-    """Return None: a vehicle that hovers at every item."""
-
-
 def plane_orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
     """Return how a plane circles at `item`.
 
@@ -89,8 +85,7 @@ def plane_orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class RallyRule:
+class RallyRule(NamedTuple):
     """Where a return goes: to the nearest rally point within `limit`, m, else home.
 
     With `home` that is one of the places to choose from, the nearest of which is it.
@@ -98,23 +93,6 @@ class RallyRule:
 
     limit: float = math.inf
     home: bool = True
-
-    def chosen(self, here: Real, home: Real, rally: Sequence[Real]) -> int | None:
-        """Return which of the places `rally`, each (2,) m, a return from `here` goes to.
-
-        None stands for home.
-
-        >>> north, east = np.array([0.0, 100.0]), np.array([300.0, 0.0])
-        >>> RallyRule().chosen(np.array([0.0, 80.0]), np.zeros(2), [east, north])
-        1
-        >>> RallyRule(limit=10.0).chosen(np.array([0.0, 80.0]), np.zeros(2), [east, north])
-        """
-        if not rally:
-            return None
-        away = [float(np.hypot(*(place - here))) for place in rally]
-        nearest = int(np.argmin(away))
-        nearer_home = self.home and float(np.hypot(*(home - here))) <= away[nearest]
-        return None if away[nearest] > self.limit or nearer_home else nearest
 
 
 def height_above_home(item: MissionItem, mission: Mission) -> float:

@@ -158,15 +158,17 @@ class Vehicle:
         It goes to `home` (2 or more,), or to one of the mission's rally points, before it lands or
         circles there.
         """
-        rally = [frame.to_local(point.latitude, point.longitude) for point in mission.rally]
-        chosen = self.type.rally(self).chosen(here[:2], home[:2], rally)
-        level = self.vertical.returns_at(float(here[2]))
-        if chosen is None:
+        rule, level = self.type.rally(self), self.vertical.returns_at(float(here[2]))
+        places = [frame.to_local(point.latitude, point.longitude) for point in mission.rally]
+        away = [float(np.hypot(*(place - here[:2]))) for place in places]
+        nearest = min(range(len(away)), key=away.__getitem__, default=None)
+        to_home = float(np.hypot(*(home[:2] - here[:2]))) if rule.home else math.inf
+        if nearest is None or away[nearest] > rule.limit or away[nearest] >= to_home:
             return np.array([*home[:2], level])
-        height = mission.rally[chosen].altitude
+        height = mission.rally[nearest].altitude
         if not math.isnan(height):
             level = max(level, height) if self.vertical.lands_on_return else height
-        return np.array([*rally[chosen], level])
+        return np.array([*places[nearest], level])
 
     def flight_model(self, latitude: float | None = None) -> Model:
         """Return how it flies at `latitude`, degrees.

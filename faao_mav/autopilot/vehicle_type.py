@@ -11,7 +11,7 @@ from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.failsafe import Failsafe
 from faao_mav.autopilot.manners import FenceAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.model import Model
-from faao_mav.autopilot.orbit import Orbits, RallyRule, no_orbit
+from faao_mav.autopilot.orbit import Orbits, RallyRule
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
@@ -124,7 +124,7 @@ class VehicleType:
     # Its flight model flies in wind: what hovers in more than it can hold as well
     models_wind: bool = False
     failsafes: tuple[Failsafe, ...] = ()  # What it does by itself on a loss
-    orbits: Orbits = no_orbit  # How it circles at an item
+    orbits: Orbits = lambda *_: None  # How it circles at an item
     # Where a return goes when there are rally points
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
 
