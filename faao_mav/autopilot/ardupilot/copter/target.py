@@ -35,7 +35,7 @@ def speed_along(ways: Real, speeds: Real | float, limits: ArduCopterLimits) -> R
 
 
 class Curve:
-    """Points (k, 3), m, of the leg to spline waypoint `to`, with unit `tangents` (k, 3).
+    """Points (k, 3), m, of the leg to spline waypoint `to`, from its beginning, with `tangents`.
 
     It leaves along the leg before, or as the spline before arrived, and arrives parallel to the
     line from its origin to the point after, or, before a straight leg, along that leg; where the
@@ -65,7 +65,7 @@ class Curve:
         leaving, arriving = scale * leaving, scale * arriving
         quadratic, cubic = 3 * step - 2 * leaving - arriving, leaving + arriving - 2 * step
         x = np.linspace(0.0, 1.0, 1 + int(np.clip(np.ceil(chord / _SPACING), 16, 200)))[:, None]
-        self.points = points[k] + x * (leaving + x * (quadratic + x * cubic))
+        self.points = x * (leaving + x * (quadratic + x * cubic))
         ways = np.gradient(self.points, axis=0)
         spacing = np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
         self.tangents = ways / spacing
@@ -165,20 +165,16 @@ class Target:
         motion[0, :3] = points[0]
         np.add.at(motion[:, :3], lasts, steps)
         np.cumsum(motion[:, :3], axis=0, out=motion[:, :3])
-        counts = np.where(straight, lasts - firsts, 0)
-        which = np.repeat(np.arange(count), counts)
-        sample = np.arange(len(which)) + np.repeat(firsts + counts - np.cumsum(counts), counts)
-        t = clock[sample] - starts[which]
-        along = np.array([entry[which] * t, entry[which], np.zeros(len(which))])
-        for each, change, begin in zip(ramps, changes, begins, strict=True):
-            along += change[which] * each[which].at(t - begin[which])
-        for kind, axis in np.ndindex(3, 3):
-            values = ways[which, axis] * along[kind]
-            motion[:, 3 * kind + axis] += np.bincount(sample, values, len(motion))
-        for k, curve in curves.items():  # their acceleration is not fed forward
-            flight = slice(firsts[k], lasts[k])
-            motion[flight, :6] += curve.motion(clock[flight] - starts[k])
-            motion[flight, :3] -= points[k]
+        for k in np.flatnonzero(flown).tolist():
+            part = slice(firsts[k], lasts[k])
+            t = clock[part] - starts[k]
+            if k in curves:  # their acceleration is not fed forward
+                motion[part, :6] += curves[k].motion(t)
+                continue
+            along = np.array([entry[k] * t, np.full(len(t), entry[k]), np.zeros(len(t))])
+            for each, change, begin in zip(ramps, changes, begins, strict=True):
+                along += change[k] * each[k].at(t - begin[k])
+            motion[part] += np.kron(along.T, ways[k])
         self.motion: Real = motion[:-1]
 
 
