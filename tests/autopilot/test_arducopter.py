@@ -32,12 +32,6 @@ def test_measured_mean_speeds_by_spacing() -> None:
             assert mean == pytest.approx(speed, abs=0.1), spacing
 
 
-def test_splines_do_not_crawl() -> None:
-    path = line(5, 60)
-    arrivals = ArduCopter().fly(replace(path, splines=np.arange(61) > 0)).arrivals
-    assert 100 / (arrivals[40] - arrivals[20]) > 7.3
-
-
 def test_measured_top_speed_by_lean_angle() -> None:
     for degrees, top in ((30, 10.3), (45, 15.2)):
         flown = ArduCopter(lean_angle=math.radians(degrees)).fly(line(1500, 1, 20.0))
@@ -70,14 +64,6 @@ def test_motion_is_continuous_and_within_limits(path: FlightPath, model: ArduCop
         if wait >= 10:
             place = [np.interp(leaves, flown.t, x) for x in flown.position.T]
             np.testing.assert_allclose(place, point, atol=0.5)
-
-
-def test_it_stops_only_where_it_holds() -> None:
-    flown = ArduCopter().fly(path_of([0, 100, 200, 300], 6, holds={1: 0.9, 2: 1}))
-    speed = np.linalg.norm(flown.velocity, axis=1)
-    near = [speed[abs(flown.t - t) < 2].min() for t in flown.arrivals[1:3]]
-    assert near[0] > 5
-    assert near[1] < 1
 
 
 def test_a_leg_to_where_it_is_takes_no_time() -> None:
@@ -137,15 +123,6 @@ def test_one_point_is_only_held() -> None:
     flown = ArduCopter().fly(path_of([3 + 4j], holds={0: 2.5}))
     assert flown.departures[0] == pytest.approx(2)
     np.testing.assert_array_equal(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
-
-
-def test_a_wider_radius_cuts_the_corner() -> None:
-    nearest = []
-    for radius in (1.0, 2.0, 5.0):
-        flown = ArduCopter(radius=radius).fly(path_of([0, 100, 100 + 100j]))
-        nearest.append(np.hypot(flown.position[:, 0] - 100, flown.position[:, 1]).min())
-    assert nearest == sorted(nearest)
-    assert 1.0 < nearest[1] < 1.5  # measured
 
 
 @settings(max_examples=30)

@@ -149,19 +149,13 @@ def test_speed_changes() -> None:
 MISSION = Mission((waypoint(), MissionItem(177, 2, (1.0, 3.0, 0.0, 0.0))), Home(1.0, 2.0, 3.0))
 
 
-def test_ardupilot_is_sent_a_home_row_and_px4_none() -> None:
-    assert COPTER.type.dialect.home_row
-    home, first, jump = as_sent(MISSION, home_row=True)
+def test_home_is_sent_in_a_row_of_its_own_or_not_at_all() -> None:
+    home, *rows = as_sent(MISSION, home_row=COPTER.type.dialect.home_row)
     assert (home.command, home.frame, home.x, home.y, home.z) == (16, 0, 1, 2, 3)
-    assert (first, jump) == MISSION.items
-
-    assert not PX4.type.dialect.home_row
-    rows = as_sent(MISSION, home_row=False)
+    assert tuple(rows) == MISSION.items
+    rows = list(as_sent(MISSION, home_row=PX4.type.dialect.home_row))
     assert rows[0] == MISSION.items[0]
-    assert rows[int(rows[1].params[0])] == rows[0]
-
-
-def test_what_is_sent_is_received() -> None:
+    assert rows[int(rows[1].params[0])] == rows[0]  # jumps count rows
     for home_row in (True, False):
         received = as_received(as_sent(MISSION, home_row=home_row), home_row=home_row)
         assert received.items == MISSION.items

@@ -67,40 +67,11 @@ def test_arrivals_are_smooth_in_speeds() -> None:
             assert roughness(model, path, leg) < 4e-3  # a detour of a few steps may begin or end
 
 
-def test_long_legs_are_flown_at_one_speed() -> None:
-    model = SUITED
-    lengths = np.array([600, 1100, 2300, 4700])
-    flights = [model.fly(line(length, 1)) for length in lengths]
-    arrivals = np.array([flown.arrivals[1] for flown in flights])
-    middle = (flights[-1].t > 100) & (flights[-1].t < 500)
-    taken = np.diff(lengths) / flights[-1].velocity[middle, 0].mean()
-    np.testing.assert_allclose(np.diff(arrivals), taken, atol=0.03)
-    moved = np.diff(flights[-1].position[:, 0])
-    mean = (flights[-1].velocity[1:, 0] + flights[-1].velocity[:-1, 0]) / 2
-    np.testing.assert_allclose(moved, mean * 0.1, atol=0.01)
-
-
-def test_any_hold_makes_it_brake() -> None:
-    passing = Px4().fly(line(60, 2))
-    holding = Px4().fly(path_of([0, 60, 120], holds={1: 0.4}))
-    assert holding.arrivals[2] > passing.arrivals[2] + 3
-
-
 def test_a_radius_as_long_as_its_leg_counts_at_once() -> None:
     path = path_of([0, 60, 70, 120])
     path.radii[2] = 15
     flown = Px4().fly(path)
     assert flown.arrivals[2] == pytest.approx(flown.departures[1])
-
-
-def test_a_larger_radius_is_faster_and_cuts_the_corner() -> None:
-    nearest, ends = [], []
-    for radius in (2, 5, 10):
-        flown = SUITED.fly(path_of([0, 100, 100 + 100j], radius=radius))
-        nearest.append(np.hypot(flown.position[:, 0] - 100, flown.position[:, 1]).min())
-        ends.append(flown.arrivals[2])
-    assert nearest == sorted(nearest)
-    assert ends == sorted(ends, reverse=True)
 
 
 def test_no_speed_means_cruise_speed_and_the_limit_holds() -> None:
