@@ -183,7 +183,7 @@ class MockAutopilot(Machine[None]):
         if not self._knows_place():
             return [replace(place, lat=0, lon=0, alt=0)] if self.behaviour.tells_no_place else []
         local = messages.LocalPositionNed(time, north, east, -up, v_north, v_east, -v_up)
-        return [place, local, messages.Attitude(time, 0.0, 0.0, heading, 0.0, 0.0, 0.0)]
+        return [place, local, messages.Attitude(time, heading)]
 
     def _follow(self, now: float) -> list[Message]:
         """Let the flight go on, and tell what becomes of it."""
@@ -289,10 +289,8 @@ class MockAutopilot(Machine[None]):
                 if known:
                     self._current = whole(command.param1)
                     answers.append(self._mission_current(now))
-            case MavCommand.REQUEST_MESSAGE | MavCommand.REQUEST_CAPABILITIES as request:
-                by_number = request == MavCommand.REQUEST_MESSAGE
-                kind = whole(command.param1) if by_number else protocol.AUTOPILOT_VERSION
-                answers += self._asked_for(kind)
+            case MavCommand.REQUEST_MESSAGE:
+                answers += self._asked_for(whole(command.param1))
                 result = ACCEPTED if answers else UNSUPPORTED
             case MavCommand.SET_INTERVAL if command.param1 == protocol.CURRENT_MODE:
                 self._tells_asked_mode = bool(self.flight.rules.loss)

@@ -285,15 +285,10 @@ class LocalPositionNed(Message):
 
 
 class Attitude(Message):
-    """ATTITUDE: radians and rad/s."""
+    """ATTITUDE: where it heads, radians from north; level and steady."""
 
     time_boot_ms: int
-    roll: float
-    pitch: float
     yaw: float
-    rollspeed: float
-    pitchspeed: float
-    yawspeed: float
 
 
 class SysStatus(Message):

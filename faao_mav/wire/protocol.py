@@ -111,7 +111,6 @@ class MavSeverity(IntEnum):
 
     CRITICAL = 2
     WARNING = 4
-    NOTICE = 5
     INFO = 6
 
 
@@ -126,7 +125,6 @@ class MavCommand(IntEnum):
     ARM = 400
     SET_INTERVAL = 511
     REQUEST_MESSAGE = 512
-    REQUEST_CAPABILITIES = 520
 
 
 SYSTEM_STATUS, LOCAL_POSITION, POSITION, CURRENT_ITEM, LOCAL_ORIGIN = 1, 32, 33, 42, 49

@@ -201,7 +201,6 @@ def test_what_ground_stations_ask_for(kind: MockKind) -> None:
     for params, expected in (
         ((512, 30), 3),
         ((511, 33, 1e5), 0),
-        ((520, 1), 0),
         ((31_000,), 3),
         ((224, 2), 0),
         ((224, 99), 2),
@@ -215,7 +214,7 @@ def test_what_ground_stations_ask_for(kind: MockKind) -> None:
 def test_no_command_and_no_setpoint_brings_it_down(kind: MockKind) -> None:
     for value in (math.nan, math.inf, -1.0, 1e30):
         desk = desk_for(kind, a_mission(3))
-        for number in (176, 224, 300, 400, 22, 511, 512, 520, 16, 0, 65_535):
+        for number in (176, 224, 300, 400, 22, 511, 512, 16, 0, 65_535):
             desk.tell(command(number, *[value] * 7))
             assert only(desk.wait(2.0), Heartbeat), number
     desk = desk_for(kind)

@@ -320,7 +320,6 @@ def download(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcom
             asked.least = max(2 * asked.least, _LATE)
         items, count, number, following = dict[int, WireItem](), -1, 0, 0
         asked.clear()
-        yield from exchange.pause()
         exchange.further()
         asked.put(_OPENING, MissionRequestList(peer.address, part))
         while len(items) != count:
