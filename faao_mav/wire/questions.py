@@ -73,12 +73,11 @@ class Pace:
 
 @dataclass(slots=True)
 class _Question:
-    """What is said when it is late; when it was put last, s, how often, and how often so."""
+    """What is said when it is late; when it was put last, s, and how often."""
 
     again: Sequence[Message] = ()
     sent: float = 0.0
     times: int = 0
-    late: int = 0
 
 
 class Questions(Generic[K]):
@@ -128,20 +127,18 @@ class Questions(Generic[K]):
     def repeat(self, most: float = math.inf) -> list[K]:
         """Put late ones again; return those given up, which were put `most` times."""
         late = [key for key, each in self._asked.items() if self._due(each) <= self._line.now]
-        if any(self._asked[key].late == 0 for key in late):
+        if any(self._asked[key].times == 1 for key in late):
             self.pace.repeat()
-        given_up = [key for key in late if self._asked[key].times >= most]
         for key in late:
-            if key in given_up:
-                del self._asked[key]
-            else:
-                self._asked[key].late += 1
-                self.put(key, *self._asked[key].again)
-        return given_up
+            question = self._asked.pop(key)
+            if question.times < most:
+                self._asked[key] = question
+                self.put(key, *question.again)
+        return [key for key in late if key not in self._asked]
 
     def _due(self, question: _Question) -> float:
         """Return when `question` is put again: each time after twice as long."""
-        wait = self.pace.wait * 2.0**question.late
+        wait = self.pace.wait * 2 ** min(question.times - 1, 8)  # beyond the longest
         return question.sent + max(min(wait, max(_LONGEST, self.pace.wait)), self.least)
 
 

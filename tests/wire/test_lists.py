@@ -59,7 +59,7 @@ def seqs(messages: Sequence[Any]) -> list[int]:
 def test_any_row_is_sent_as_often_as_asked_for_in_any_order() -> None:
     for firmware in FAMILIES:
         desk = uploading(firmware)
-        for seq in (0, 0, 2, 1, 1, 0, 2):
+        for seq in (*[0] * 2000, 2, 1, 1, 0, 2):
             assert seqs(desk.tell(request(seq))) == [seq]
         assert desk.tell(request(3)) == []
         desk.tell(ack(MavResult.ACCEPTED))

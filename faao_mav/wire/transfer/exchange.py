@@ -136,17 +136,12 @@ class _Exchange:
         while self._line.now < self.until and not self.armed:
             if self._line.heard is None:
                 self.asked.repeat()
-            message = yield from self._wait(min(self.asked.due, self.until))
+            message = yield from self.wait(min(self.asked.due, self.until))
             match message:
                 case ListMessage(target=to, mission_type=part) if part == self._part:
                     if self._peer.own.takes(to):
                         return message
         return None
-
-    def pause(self) -> Talk[None]:
-        """Wait until the next question may be put, whatever is said about the list."""
-        while self._line.now < self.asked.last + self.asked.least:
-            yield from self._wait(self.asked.last + self.asked.least)
 
     def boots(self, result: int, until: float) -> Talk[bool]:
         """Wait for the reason of a refusal; tell whether it was that the vehicle booted.
@@ -159,12 +154,12 @@ class _Exchange:
                 if not self._peer.boots:
                     return True
                 rests = until
-            yield from self._wait(rests)
+            yield from self.wait(rests)
             booted = booted or self._peer.boots
         self.result = result
         return False
 
-    def _wait(self, until: float) -> Talk[Message | None]:
+    def wait(self, until: float) -> Talk[Message | None]:
         """Return what the vehicle says next, None where that is nothing by the time `until`."""
         try:
             yield until
@@ -231,7 +226,7 @@ def upload(
     title, last, boots_until = f"uploading {part.title}", len(items) - 1, math.inf
     exchange = _Exchange(line, peer, part, writes=True)
     asked, repeats = exchange.asked, math.isfinite(peer.manners.request_period)
-    pairs = peer.manners.ignores_other_items
+    pairs = passes_over = peer.manners.ignores_other_items
 
     def send(seq: int) -> None:
         ahead = pairs and seq + 1 < last
@@ -272,9 +267,7 @@ def upload(
                 # Before the last item was asked for it can only be about something else.
                 if furthest == last:
                     return exchange.ended("accepted", MavResult.ACCEPTED, reached, (), number)
-            case MissionAck(type=MavResult.INVALID_SEQUENCE) if not (
-                peer.manners.ignores_other_items
-            ):
+            case MissionAck(type=MavResult.INVALID_SEQUENCE) if not passes_over:
                 if asked.times(current) > 1 and current + 1 < last:
                     asked.answer(current)
                     current += 1
@@ -340,9 +333,7 @@ def download(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcom
                     for seq in list(asked):
                         request(seq)
                     continue
-                case MissionAck(type=result) if (
-                    result in TENTATIVE or result == MavResult.INVALID_SEQUENCE
-                ):
+                case MissionAck(type=result) if result in {*TENTATIVE, MavResult.INVALID_SEQUENCE}:
                     exchange.doubt(result)  # which may be about a late item of an upload
                     continue
                 case MissionAck(type=result) if result != MavResult.ACCEPTED:
@@ -350,8 +341,8 @@ def download(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcom
                 case _:
                     continue
             exchange.further()
-            if not wide and following < count:
-                yield from exchange.pause()
+            while not wide and following < count and line.now < asked.last + asked.least:
+                yield from exchange.wait(asked.last + asked.least)
             room = _WINDOW if wide and asked.pace.mean is not None else 1
             while following < count and len(asked) < room:
                 request(following)
