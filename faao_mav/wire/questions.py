@@ -138,7 +138,7 @@ class Questions(Generic[K]):
 
     def _due(self, question: _Question) -> float:
         """Return when `question` is put again: each time after twice as long."""
-        wait = self.pace.wait * 2 ** min(question.times - 1, 8)  # beyond the longest
+        wait = self.pace.wait * 2.0 ** min(question.times - 1, 8)  # beyond the longest
         return question.sent + max(min(wait, max(_LONGEST, self.pace.wait)), self.least)
 
 
