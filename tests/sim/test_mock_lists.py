@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from stations import FOREIGN, HOME, VEHICLE, Desk, mock_of, places, rows_for
+from stations import FOREIGN, VEHICLE, Desk, mock_of, places, rows_for
 
 from faao_mav.sim import Behaviour, behaviour_of
 from faao_mav.wire.messages import (
@@ -120,13 +120,6 @@ def test_what_is_no_list_or_does_not_fit() -> None:
     assert results(desk.tell(count(3))) == [MavResult.NO_SPACE]
     desk.wait(5.1)
     assert asked(desk.tell(count(3))) == [0]
-
-
-def test_ardupilot_keeps_its_own_home_in_row_0() -> None:
-    desk = desk_for("ardupilot")
-    elsewhere = WireItem(16, 0, (0.0, 0.0, 0.0, 0.0), *PLACE, 1.0)
-    upload(desk, (elsewhere, *rows_for("ardupilot", 3)[1:]))
-    assert stored(desk)[0] == (16, round(HOME.latitude * 1e7), 1_491_652_370, 584.0)
 
 
 def test_clearing_one_list_leaves_the_others() -> None:

@@ -12,7 +12,7 @@ import pytest
 from conftest import PATIENCE, free_port
 from mock_flights import fly
 from served import running
-from stations import FENCE, HOME, VEHICLE, Air, a_mission, mock_of, rows_for, vehicle_of
+from stations import FENCE, HOME, VEHICLE, Air, Desk, a_mission, mock_of, rows_for, vehicle_of
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -22,7 +22,7 @@ from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import download, upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import choose, discover
-from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     CommandAck,
     CommandLong,
@@ -31,7 +31,6 @@ from faao_mav.wire.messages import (
     HomePosition,
     Message,
     MissionAck,
-    MissionCount,
     MissionItemInt,
     Statustext,
     WireItem,
@@ -51,62 +50,13 @@ def row(
     return WireItem(command, 3, (p, 0.0, 0.0, 0.0), x, y, z)
 
 
-def told(machine: Machine[Any], *messages: Message) -> list[Message]:
-    """Return what `machine` answers, by way of real packets."""
-    here, there, out = Codec(VEHICLE), Codec(GROUND_STATION), list[Message]()
-    for number, message in enumerate(messages):
-        for packet in here.parse(there.pack(message)):
-            assert packet.envelope is not None
-            out += machine.on(packet.envelope, number / 100)
-    for answer in out:
-        here.pack(answer)
-    return out
-
-
-def fill(mock: MockAutopilot, part: MissionType, rows: tuple[WireItem, ...]) -> list[Message]:
-    items = (MissionItemInt(VEHICLE, part, seq, item) for seq, item in enumerate(rows))
-    return told(mock, MissionCount(VEHICLE, part, len(rows)), *items)
-
-
-def flying(kind: MockKind) -> MockAutopilot:
-    mock = mock_of(kind)
-    mock.start(0.0)
-    return mock
-
-
-START = (
-    CommandLong(VEHICLE, MavCommand.ARM, 0, 1.0),
-    CommandLong(VEHICLE, MavCommand.START, 0),
-)
-
-
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_a_mock_lives_on_whatever_it_stores_and_is_started(kind: MockKind) -> None:
-    for part, stored in (
-        *((MissionType.FENCE, row(5001, 0.0, p=count)) for count in (5.0, NAN, INF, -1.0)),
-        (MissionType.FENCE, row(5003, 0.0, p=NAN)),
-        (MissionType.FENCE, row(5000, NAN)),
-        (MissionType.RALLY, row(5100, INF)),
-        *((MissionType.MISSION, row(16, z)) for z in (3e38, -3e38, NAN, INF)),
-        (MissionType.MISSION, row(16, x=-(2**31))),
-    ):
-        mock, mission = flying(kind), rows_for(kind, 4)
-        if part is MissionType.MISSION:
-            mission = (*mission[:-1], stored)
-        else:
-            fill(mock, part, (stored,))
-        fill(mock, MissionType.MISSION, mission)
-        answers = told(mock, *START)
-        assert sum(isinstance(answer, CommandAck) for answer in answers) == 2, stored
-        for now in (1.0, 10.0, 100.0, 1e5):
-            for answer in mock.tick(now):
-                Codec(VEHICLE).pack(answer)
-
-
 def test_a_flight_that_cannot_be_predicted_is_denied() -> None:
-    mock = flying("px4")
-    fill(mock, MissionType.MISSION, (*rows_for("px4", 4)[:-1], row(16, 3e38)))
-    *_, ack = told(mock, *START)
+    desk = Desk(mock_of("px4"), GROUND_STATION)
+    desk.start()
+    high = (*rows_for("px4", 4)[:-1], row(16, 3e38))
+    desk.machine.lists.replace(MissionType.MISSION, high)
+    desk.tell(CommandLong(VEHICLE, MavCommand.ARM, 0, 1.0))
+    (ack,) = desk.tell(CommandLong(VEHICLE, MavCommand.START, 0))
     assert ack == CommandAck(GROUND_STATION, MavCommand.START, DENIED)
 
 
