@@ -126,22 +126,22 @@ def open_transport(text: str) -> Transport:
         raise wrong(f"connection {text!r}: {told}") from None
 
 
-Peer: TypeAlias = tuple[str, int]
+_Place: TypeAlias = tuple[str, int]
+"""A host and a port."""
 
 
-def _origin(address: Peer) -> Origin:
+def _origin(address: _Place) -> Origin:
     return f"{address[0]}:{address[1]}"
 
 
 class _Udp:
     """A UDP socket that sends to one place, or to whoever was heard."""
 
-    def __init__(self, address: Peer, *, listens: bool) -> None:
+    def __init__(self, address: _Place, *, listens: bool) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._target, self.listens = None if listens else address, listens
-        self._framers: dict[Peer, Framer] = {}
-        self._heard: dict[Peer, float] = {}
-        """When each sender was heard last, s; who is silent longest comes first."""
+        self._senders: dict[_Place, tuple[float, Framer]] = {}
+        """When each was heard last, s, and what cuts it up; who is silent longest comes first."""
         try:
             self._socket.setblocking(False)
             if listens:
@@ -171,29 +171,28 @@ class _Udp:
     def close(self) -> None:
         self._socket.close()
 
-    def _targets(self, to: Origin | None) -> list[Peer]:
+    def _targets(self, to: Origin | None) -> list[_Place]:
         if self._target is not None:
             return [self._target]
         if to is not None:
             host, _, port = to.rpartition(":")
             return [(host, int(port))]
         recent = time.monotonic() - _FORGET
-        return [address for address, heard in self._heard.items() if heard > recent]
+        return [address for address, (heard, _) in self._senders.items() if heard > recent]
 
-    def _framer(self, address: Peer) -> Framer:
+    def _framer(self, address: _Place) -> Framer:
         """Return what cuts up what comes from `address`; too many forget who is silent longest."""
-        self._heard.pop(address, None)
-        if len(self._heard) == _MOST_PEERS:
-            silent = next(iter(self._heard))
-            del self._heard[silent], self._framers[silent]
-        self._heard[address] = time.monotonic()
-        return self._framers.setdefault(address, Framer())
+        _, framer = self._senders.pop(address, (0.0, Framer()))
+        if len(self._senders) == _MOST_PEERS:
+            del self._senders[next(iter(self._senders))]
+        self._senders[address] = time.monotonic(), framer
+        return framer
 
 
 class _Tcp:
     """TCP: the connection that this end made, or all that others make to a listening socket."""
 
-    def __init__(self, address: Peer, *, listens: bool) -> None:
+    def __init__(self, address: _Place, *, listens: bool) -> None:
         self._name, self.listens = f"tcp:{_origin(address)}", listens
         self._listener = socket.create_server(address) if listens else None
         self._peers: dict[socket.socket, tuple[Origin, Framer]] = {}
@@ -237,7 +236,7 @@ class _Tcp:
     def _sockets(self) -> list[socket.socket]:
         return [*self._peers] if self._listener is None else [self._listener, *self._peers]
 
-    def _welcome(self, peer: socket.socket, address: Peer) -> None:
+    def _welcome(self, peer: socket.socket, address: _Place) -> None:
         """Take one more peer, if there is room; it is dropped when it does not read."""
         if len(self._peers) == _MOST_PEERS:
             peer.close()
