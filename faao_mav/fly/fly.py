@@ -87,10 +87,10 @@ def fly_mission(
             watch = Start(peer, rows, ready, lands=lands, rate=rate)
         else:
             watch = Watch(peer, rows, ready if judged else None, lands=lands, rate=rate)
-        watch.seen.strangers = session.link.strangers
+        watch.seen.strangers = session.strangers
         try:
             beats = isinstance(watch, Start)
-            ending = session.link.watch(watch, lambda: watching(watch), beats=beats)
+            ending = session.watch(watch, lambda: watching(watch), beats=beats)
         except LinkError as error:
             ending = Ending("lost", str(error))
     found = watch.findings or ()

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypedDict, TypeVar, Unpack
+from typing import TypedDict, Unpack
 
 from faao_mav.autopilot import families
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
@@ -14,7 +14,7 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import SETTLE, FoundVehicle, choose, discover
 from faao_mav.wire.link import Observe, WireLink
-from faao_mav.wire.machine import Script, Talk
+from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition
 from faao_mav.wire.parameters import Change, check_settable, set_parameters
 from faao_mav.wire.protocol import (
@@ -41,8 +41,6 @@ from faao_mav.wire.transfer.session import (
 from faao_mav.wire.transport import parse_connection
 from faao_mav.wire.whereabouts import Whereabouts, home_in, place_in
 from faao_mav.wire.wire_items import home_items, mission_of, wire_items
-
-T = TypeVar("T")
 
 _PASSED_OVER: dict[Verdict, str] = {
     "forged": "packets come that are signed with another key than the one in {key}",
@@ -256,7 +254,7 @@ def _all_held(peer: Peer) -> Talk[tuple[Lists, HomePosition | None]]:
     return lists, (yield from ask_for(peer.address, HOME_POSITION, HomePosition))
 
 
-class Session:
+class Session(WireLink):
     """A link to the one vehicle that has been found; to be used in a `with` statement.
 
     The arguments are those of `LinkOptions`. With `knocks` a vehicle is woken up that waits for a
@@ -279,53 +277,51 @@ class Session:
         note: Callable[[str], object] | None = None,
     ) -> None:
         self.started = time.monotonic()
-        self._observe, self._note = observe or (lambda *_: None), note or warnings.warn
         self._key_file = signing_key
         self._signing = None if signing_key is None else read_signing(signing_key)
-        own = Address(own_system or GROUND_STATION.system, GROUND_STATION.component)
-        self.link = WireLink(
-            connection, signing=self._signing, log=log, address=own, note=self._note
+        super().__init__(
+            connection,
+            signing=self._signing,
+            log=log,
+            address=Address(own_system or GROUND_STATION.system, GROUND_STATION.component),
+            note=note or warnings.warn,
+            observe=observe or (lambda *_: None),
         )
         timeouts = timeouts or Timeouts()
         search = discover(
             system,
             component,
             patience=wait,
-            settle=SETTLE if self.link.listens else None,
+            settle=SETTLE if self.listens else None,
             boot=timeouts.boot,
             knocks=knocks and parse_connection(connection).kind == "serial",
         )
         try:
             heard = self.run(search)
             for verdict, text in _PASSED_OVER.items():
-                if self._signing and not heard.vehicles and verdict in self.link.codec.heard:
+                if self._signing and not heard.vehicles and verdict in self.codec.heard:
                     told = text.format(key=signing_key)
                     raise LinkError(f"{connection}: no vehicle: {told}")
             self.found = choose(heard, connection, system, component, wait)
-            self.link.bind(self.found.address, *self.found.origins)
+            self.bind(self.found.address, *self.found.origins)
             self._check_alive(connection, timeouts)
         except BaseException:
             self.close()
             raise
-        self.peer = Peer(own, self.found.address, self.found.vehicle, timeouts=timeouts)
-
-    def __enter__(self) -> "Session":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        ends = self.address, self.found.address
+        self.peer = Peer(*ends, self.found.vehicle, timeouts=timeouts)
 
     def close(self) -> None:
         """Let go of the link; say what became of the log, keep the time of the last packet."""
-        self.link.close()
+        super().close()
         if self._signing is not None and self._key_file is not None:
             remember(self._key_file, self._signing)
-        if self.link.log is not None and self.link.log.failure is not None:
-            self._note(self.link.log.failure)
+        if self.log is not None and self.log.failure is not None:
+            self._note(self.log.failure)
 
     def _check_alive(self, connection: str, timeouts: Timeouts) -> None:
         """Raise `LinkError` for a recording, and for a vehicle that does not read MAVLink 2."""
-        old = self.found.address not in self.link.codec.modern
+        old = self.found.address not in self.codec.modern
         if self._signing is None and not old:
             return
         asked = ask_alive(self.found.address, secrets.randbits(62), timeouts.silence)
@@ -354,11 +350,7 @@ class Session:
 
     def why_silent(self) -> str:
         """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
-        if self._signing is None and "signed" in self.link.codec.heard:
+        if self._signing is None and "signed" in self.codec.heard:
             return "; it signs its packets, and may want them signed: --signing-key"
         family = self.found.family
         return f"; {family.only_one_station}" if family and family.only_one_station else ""
-
-    def run(self, job: Talk[T]) -> T:
-        """Run `job` to its end and return the outcome."""
-        return self.link.run(Script(job), self._observe)

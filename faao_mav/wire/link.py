@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable, Sequence
 from io import FileIO
 from pathlib import Path
-from typing import TypeAlias, TypeVar
+from typing import Self, TypeAlias, TypeVar
 
 from faao_mav.errors import HangUp, InputError, LinkError
 from faao_mav.files import check_writable
 from faao_mav.wire.codec import Codec, Packet
 from faao_mav.wire.framing import message_id, sender_of
-from faao_mav.wire.machine import Machine
+from faao_mav.wire.machine import Machine, Script, Talk
 from faao_mav.wire.messages import Heartbeat, Message
 from faao_mav.wire.protocol import (
     GROUND_STATION,
@@ -88,12 +88,12 @@ def _open_for_owner(path: str, flags: int) -> int:
 
 
 class WireLink:
-    """One end of a link: runs machines on a transport.
+    """One end of a link: runs talks and machines on a transport.
 
     What a machine answers goes where it was asked from. What it says by itself goes to everybody,
     and once the link is `bound` to a vehicle everything goes to that alone. `log` is the exchange
-    in a file, if there is to be one; `note` is told what is odd. Use the link in a `with`
-    statement.
+    in a file, if there is to be one; `note` is told what is odd, `observe` how far a talk is. Use
+    the link in a `with` statement.
     """
 
     def __init__(
@@ -104,8 +104,9 @@ class WireLink:
         log: Path | None = None,
         address: Address = GROUND_STATION,
         note: Callable[[str], object] = lambda _: None,
+        observe: Observe = lambda *_: None,
     ) -> None:
-        self.address, self._note = address, note
+        self.address, self._note, self._observe = address, note, observe
         self.codec = Codec(address, signing)
         self.log = None if log is None else Tlog(log)
         self._vehicle: tuple[Address, Origin] | None = None
@@ -118,7 +119,7 @@ class WireLink:
         self.listens = self._transport.listens
         """Whether anybody may send here: several vehicles, of one number perhaps."""
 
-    def __enter__(self) -> "WireLink":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -139,17 +140,18 @@ class WireLink:
         """
         self._vehicle = vehicle, origin
 
-    def run(self, machine: Machine[T], observe: Observe = lambda *_: None) -> T:
-        """Run `machine` to its end and return the outcome.
+    def run(self, talk: Talk[T]) -> T:
+        """Run `talk` to its end and return the outcome.
 
         Interrupted from the keyboard it cancels the transfer first. Raises `LinkError`, which says
         what was under way.
         """
+        machine = Script(talk)
         try:
             self.begin(machine)
             while (outcome := machine.outcome) is None:
                 self.step(machine, time.monotonic() + _BEAT)
-                observe(*machine.progress)
+                self._observe(*machine.progress)
             return outcome
         except (KeyboardInterrupt, LinkError) as end:
             what, done, total = machine.progress

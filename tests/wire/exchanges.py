@@ -27,9 +27,8 @@ from simulators import simulated
 
 from faao_mav.wire.discover import discover
 from faao_mav.wire.link import WireLink
-from faao_mav.wire.machine import Machine, Script
+from faao_mav.wire.machine import AT_ONCE, Talk
 from faao_mav.wire.messages import (
-    Envelope,
     ListMessage,
     Message,
     MissionAck,
@@ -45,7 +44,7 @@ from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionTy
 EXCHANGES = Path(__file__).parent.parent / "data" / "exchanges"
 _FILES = {"arducopter": "ardupilot.txt", "arduplane": "ardupilot.txt", "px4": "px4.txt"}
 
-Talk: TypeAlias = Callable[[list[Message], float, int], list[Message]]
+Tell: TypeAlias = Callable[[list[Message], float, int], list[Message]]
 """Sends messages, and returns what is said about lists within so many seconds, or as soon as there
 are so many answers."""
 
@@ -98,7 +97,7 @@ def exchanges(text: str) -> dict[str, list[str]]:
     return found
 
 
-def played(lines: list[str], talk: Talk, vehicle: Address) -> list[str]:
+def played(lines: list[str], talk: Tell, vehicle: Address) -> list[str]:
     """Return `lines` with the answers that `talk` gives in place of those that they have."""
     out = []
     for number, line in enumerate(lines):
@@ -155,31 +154,17 @@ def _written(message: Message) -> str:
 _TYPES = {part.name.lower(): part for part in MissionType}
 
 
-class Conversation(Machine[list[Message]]):
-    """A machine that sends messages once, and whose outcome is what is said about lists to it."""
-
-    progress = ("talking", 0, 0)
-
-    def __init__(self, messages: list[Message], patience: float, expected: int) -> None:
-        super().__init__()
-        self._messages, self._patience, self._expected = messages, patience, expected
-        self._heard: list[Message] = []
-
-    def start(self, now: float) -> list[Message]:
-        self._due = now + (self._patience if self._expected else QUIET)
-        return self._messages
-
-    def _receive(self, envelope: Envelope, now: float) -> list[Message]:  # noqa: ARG002
-        message = envelope.message
+def conversation(messages: list[Message], patience: float, expected: int) -> Talk[list[Message]]:
+    """Send messages once, and return what is said about lists to it."""
+    line = yield AT_ONCE
+    line.say(*messages)
+    heard, until = list[Message](), line.now + (patience if expected else QUIET)
+    while line.now < until and (not expected or len(heard) < expected):
+        line = yield until
+        message = None if line.heard is None else line.heard.message
         if isinstance(message, ListMessage) and message.target == GROUND_STATION:
-            self._heard.append(message)
-            if len(self._heard) == self._expected:
-                self.outcome = self._heard
-        return []
-
-    def _time_out(self, now: float) -> list[Message]:  # noqa: ARG002
-        self.outcome = self._heard
-        return []
+            heard.append(message)
+    return heard
 
 
 def recorded(kind: str) -> str:
@@ -190,11 +175,11 @@ def recorded(kind: str) -> str:
 def renewed(kind: str, autopilots: Path, where: Path) -> str:
     """Return these exchanges with the answers that the real one gives now."""
     with simulated(autopilots, kind, where) as connection, WireLink(connection) as link:
-        (found,) = link.run(Script(discover(patience=20.0))).vehicles
+        (found,) = link.run(discover(patience=20.0)).vehicles
 
         def talk(messages: list[Message], patience: float, expected: int) -> list[Message]:
             # What is said late, on a busy machine, is waited for.
-            return link.run(Conversation(messages, max(patience, PATIENCE), expected))
+            return link.run(conversation(messages, max(patience, PATIENCE), expected))
 
         return "\n\n".join(
             "\n".join([f"# {name}", *played(lines, talk, found.address)])
