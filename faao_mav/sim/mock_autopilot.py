@@ -104,12 +104,12 @@ class MockAutopilot(Machine[None]):
     @property
     def deadline(self) -> float:
         """When `tick` is due."""
-        report = self._next_report if self._period < math.inf else math.inf
-        return min(self._next_beat, self.lists.deadline, report)
+        return min(self._next_beat, self.lists.deadline, self._next_report)
 
     def start(self, now: float) -> Sequence[Message]:
         """Boot."""
-        self._booted = self._now = self._next_beat = self._next_report = now
+        self._booted = self._now = self._next_beat = now
+        self._next_report = now if self._period < math.inf else math.inf
         self._ready_at = now + self._boot
         return self.tick(now)
 
@@ -157,7 +157,7 @@ class MockAutopilot(Machine[None]):
             out.append(messages.BatteryStatus(0, 1, self._battery))
             if self._tells_asked_mode:
                 out.append(messages.CurrentMode(self.flight.mode, self.flight.asked_mode))
-        if now >= self._next_report and self._period < math.inf:
+        if now >= self._next_report:
             self._next_report = now + self._period
             out += self._place_reports(now)
         return out
@@ -284,10 +284,11 @@ class MockAutopilot(Machine[None]):
                 mode = self.behaviour.requested_mode(main, sub) if custom else None
                 result = self.behaviour.no_mode if mode is None else self._set_mode(mode, now)
             case MavCommand.SET_CURRENT:
-                known = whole(command.param1) in range(len(self.lists.items(MissionType.MISSION)))
-                result = ACCEPTED if known else DENIED
-                if known:
-                    self._current = whole(command.param1)
+                number, rows = whole(command.param1), self.lists.items(MissionType.MISSION)
+                if number not in range(len(rows)):
+                    result = DENIED
+                else:
+                    self._current = number
                     answers.append(self._mission_current(now))
             case MavCommand.REQUEST_MESSAGE:
                 answers += self._asked_for(whole(command.param1))
