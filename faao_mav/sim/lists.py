@@ -34,7 +34,7 @@ class _Transfer:
     items: tuple[WireItem, ...] = ()
 
 
-class Lists:
+class StoredLists:
     """What `vehicle` stores, and how it answers the mission protocol as `behaviour` says.
 
     `ready` tells whether booting is over, `flying` whether the mission is being flown. By its

@@ -14,7 +14,7 @@ from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.behaviour import Behaviour, whole
 from faao_mav.sim.flight import Flight, Fly
 from faao_mav.sim.follower import Posture
-from faao_mav.sim.lists import Lists
+from faao_mav.sim.lists import StoredLists
 from faao_mav.sim.parameter_protocol import ParameterServer
 from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
@@ -82,7 +82,7 @@ class MockAutopilot(Machine[None]):
         known |= behaviour.parameters
         self.parameters = ParameterServer(known, parameters or {}, self.vehicle)
         self.flight = Flight(self.vehicle, self.parameters.values, home, fly, wind)
-        self.lists = Lists(
+        self.lists = StoredLists(
             self.vehicle, home, behaviour, self._is_ready, lambda: self.flight.on_mission
         )
         self._speedup, self._beat, self._boot, self._place = speedup, beat, boot, place

@@ -22,7 +22,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
-from faao_mav.wire.transfer.exchange import Peer, download, upload
+from faao_mav.wire.transfer.exchange import Peer, read_list, send_list
 from faao_mav.wire.transfer.session import upload_parts
 from faao_mav.wire.wire_items import wire_items
 
@@ -206,7 +206,7 @@ def there_and_back(
     peer = peer_of(kind)
     rows = rows_for(kind, count)[:count]
     courses = []
-    for talk in (upload(rows, peer), download(peer)):
+    for talk in (send_list(rows, peer), read_list(peer)):
         client, server = Counted(Script(talk)), Counted(mock)
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
         took = simulate(*stations, faults, until=2000.0, **more)

@@ -26,7 +26,7 @@ from stations import (
 from faao_mav.errors import LinkError
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults
-from faao_mav.sim.lists import Lists
+from faao_mav.sim.lists import StoredLists
 from faao_mav.wire.discover import choose, discover
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
@@ -36,7 +36,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
-from faao_mav.wire.transfer.exchange import TENTATIVE, Peer, upload
+from faao_mav.wire.transfer.exchange import TENTATIVE, Peer, send_list
 from faao_mav.wire.transfer.session import clear_lists, explain, upload_parts
 from faao_mav.wire.wire_items import wire_items
 
@@ -144,7 +144,7 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind: Mo
     for head_start in range(4):
         mock = mock_of(kind)
         ours, theirs = rows_for(kind, 8), rows_for(kind, 9, shift=0.1)
-        rival = Script(upload(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind))))
+        rival = Script(send_list(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind))))
         faults = Faults(latency=0.004 * (1 + head_start), reordering=0.5, delay=0.05)
         report, _ = upload_to(mock, ours, faults, others=[Station(rival, FOREIGN)])
         if report.verified:
@@ -177,7 +177,7 @@ def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind) -> None:
 def test_an_accepted_fence_that_is_lost_is_sent_again() -> None:
     """A real ArduPilot reads back an empty fence after about one of twelve uploads."""
 
-    class Loses(Lists):
+    class Loses(StoredLists):
         times = 2
 
         def replace(self, part: MissionType, items: Iterable[WireItem]) -> None:
@@ -220,7 +220,7 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission(may_be_armed: bool, wh
 
 
 def test_a_vehicle_that_stores_something_else_is_found_out() -> None:
-    class Forgetful(Lists):
+    class Forgetful(StoredLists):
         def kept(self, part: MissionType, seq: int, row: WireItem) -> WireItem:
             kept = super().kept(part, seq, row)
             return super().kept(part, seq, rows_for("px4", 8)[3]) if seq == 5 else kept

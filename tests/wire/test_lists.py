@@ -20,7 +20,7 @@ from faao_mav.wire.messages import (
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.questions import Pace, Questions, Timeouts
-from faao_mav.wire.transfer.exchange import clear, download, upload
+from faao_mav.wire.transfer.exchange import clear_list, read_list, send_list
 
 ME = GROUND_STATION
 ROWS = rows_for("px4", 9)
@@ -45,7 +45,7 @@ def item(seq: int, *, target: Address = ME, part: int = 0) -> MissionItemInt:
 
 def uploading(firmware: str, count: int = 3, asked: int = 0, part: int = 0) -> Desk:
     """Return a desk at which `asked` of `count` items have been asked for."""
-    desk = Desk(Script(upload(ROWS[:count], peer_of(firmware), MissionType(part))))
+    desk = Desk(Script(send_list(ROWS[:count], peer_of(firmware), MissionType(part))))
     desk.start()
     for seq in range(asked):
         desk.tell(request(seq))
@@ -138,7 +138,11 @@ def test_what_is_said_to_others_or_about_other_lists_is_ignored(
 
 
 def test_either_end_may_give_up() -> None:
-    for talk in (upload(ROWS, peer_of("px4")), download(peer_of("px4")), clear(peer_of("px4"))):
+    for talk in (
+        send_list(ROWS, peer_of("px4")),
+        read_list(peer_of("px4")),
+        clear_list(peer_of("px4")),
+    ):
         desk = Desk(Script(talk))
         desk.start()
         assert desk.machine.cancel(desk.now) == [CANCEL]
@@ -150,7 +154,7 @@ def test_either_end_may_give_up() -> None:
 
 def reading(firmware: str, count: int = 3) -> Desk:
     """Return a desk that reads a list, and has been told how long that is."""
-    desk = Desk(Script(download(peer_of(firmware))))
+    desk = Desk(Script(read_list(peer_of(firmware))))
     assert desk.start() == [MissionRequestList(VEHICLE, 0)]
     desk.tell(MissionCount(ME, 0, count, 99))
     return desk
@@ -174,7 +178,7 @@ def test_a_whole_download(firmware: str, acks: int) -> None:
 
 
 def test_what_was_not_asked_for_now_or_by_us_is_ignored() -> None:
-    desk = Desk(Script(download(peer_of("generic"))))
+    desk = Desk(Script(read_list(peer_of("generic"))))
     desk.start()
     for message in (MissionCount(FOREIGN, 0, 7), MissionCount(ME, 1, 7), item(0)):
         assert desk.tell(message) == []

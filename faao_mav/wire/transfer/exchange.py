@@ -7,7 +7,6 @@ from typing import Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.autopilot.manners import Manners
-from faao_mav.errors import InputError
 from faao_mav.wire.machine import AT_ONCE, Line, Talk
 from faao_mav.wire.messages import (
     Heartbeat,
@@ -199,10 +198,10 @@ class _Exchange:
         return Outcome(status, result, reached, tuple(items), said, opaque_id)
 
 
-def upload(
+def send_list(
     items: Sequence[WireItem], peer: Peer, part: MissionType = MissionType.MISSION
 ) -> Talk[Outcome]:
-    """Upload `items`; the vehicle leads.
+    """Upload `items`, of which there is one at least; the vehicle leads.
 
     - Any item below the count is sent whenever it is asked for, by either request, as
       MISSION_ITEM_INT. PX4 and ArduPilot are sent it again when nothing follows: it was lost, or
@@ -217,11 +216,7 @@ def upload(
       tell.
     - NO_SPACE or UNSUPPORTED from an ArduPilot that boots, as it does after a reboot in the middle,
       means "not yet": it is told again once it is ready.
-
-    Raises `InputError` without items: an empty list is what `clear` is for.
     """
-    if not items:
-        raise InputError(f"upload: no {part.title} items; clear the list instead")
     line = yield AT_ONCE
     title, last, boots_until = f"uploading {part.title}", len(items) - 1, math.inf
     exchange = _Exchange(line, peer, part, writes=True)
@@ -289,7 +284,7 @@ def upload(
                 current, furthest = begin()
 
 
-def download(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcome]:
+def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcome]:
     """Download a list and acknowledge it.
 
     PX4 gives the item that it expects to be asked for, or the one before, and ends the transfer
@@ -355,7 +350,7 @@ def download(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcom
     return exchange.over()
 
 
-def clear(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcome]:
+def clear_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcome]:
     """Clear a list; asking twice does no harm, so it is asked until it is answered.
 
     PX4 says nothing while busy, ArduPilot ERROR.

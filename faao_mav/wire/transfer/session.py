@@ -8,7 +8,14 @@ from faao_mav.mission.item import Mission
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType, listed, meaning
-from faao_mav.wire.transfer.exchange import TENTATIVE, Outcome, Peer, clear, download, upload
+from faao_mav.wire.transfer.exchange import (
+    TENTATIVE,
+    Outcome,
+    Peer,
+    clear_list,
+    read_list,
+    send_list,
+)
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
 
@@ -81,7 +88,7 @@ def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk["Lists"]:
     items: dict[MissionType, tuple[WireItem, ...]] = {}
     missing: dict[MissionType, Outcome] = {}
     for part in types:
-        outcome = yield from download(peer, part)
+        outcome = yield from read_list(peer, part)
         absent = part is not MissionType.MISSION and outcome.result in ABSENT
         if outcome.status == "accepted" or absent:
             items[part] = outcome.items
@@ -96,10 +103,10 @@ def clear_lists(types: Sequence[MissionType], peer: Peer) -> Talk[tuple[PartRepo
     """Clear the lists of `types`, and read back that they are empty (but for the home item)."""
     reports = []
     for part in types:
-        cleared = yield from clear(peer, part)
+        cleared = yield from clear_list(peer, part)
         report = _unread(part, 0, cleared, 1)
         if cleared.status in ("accepted", "silent"):
-            read = yield from download(peer, part)
+            read = yield from read_list(peer, part)
             if read.status == "accepted":
                 home = read.items[: home_items(peer.vehicle, part)]
                 differences = compare(home, read.items, part, peer.vehicle)
@@ -117,10 +124,10 @@ def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> 
     attempt, final = 0, False
     while not final:
         attempt += 1
-        sent = yield from upload(items, peer, part)
+        sent = yield from send_list(items, peer, part)
         report = _unread(part, number, sent, attempt)
         if sent.status in ("accepted", "unknown"):
-            read = yield from download(peer, part)
+            read = yield from read_list(peer, part)
             if read.status == "accepted":
                 differences = compare(items, read.items, part, peer.vehicle)
                 right = all(difference.kind != "wrong" for difference in differences)
