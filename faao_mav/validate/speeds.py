@@ -121,24 +121,17 @@ def _slow(context: ValidationContext) -> Hits:
             yield hit("speed-not-reached", legs[0].index, where=where, span=span, **told)
 
 
-def _reached_speeds(context: ValidationContext) -> list[tuple[Straight, float]]:
-    """Return the level legs between waypoints, and the speed that each reaches, m/s.
-
-    That is the greatest speed of the predicted flight towards the leg's end. Without one it is
-    what the leg's length allows by the model of a single leg, of which splines have none.
-    """
-    waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)}
-    legs = [leg for leg in _long_legs(context) if leg.index in waypoints]
-    legs = [leg for leg in legs if leg.start.index != HOME and not leg.jump]
+def _reached_speeds(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
+    """Yield the legs between waypoints, and the predicted flight's greatest speed on each, m/s."""
     if context.track is None:
-        legs = [leg for leg in legs if not leg.spline]
-        lengths = np.array([leg.length for leg in legs])
-        reachable = context.vehicle.flight_model().reachable_speed(lengths)
-        return [(leg, min(float(v), leg.speed)) for leg, v in zip(legs, reachable, strict=True)]
+        return
+    waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)}
     fastest = np.full(len(context.items), -np.inf)
     np.maximum.at(fastest, context.track.item, np.hypot(*context.track.velocity[:, :2].T))
-    flown = (leg for leg in legs if fastest[leg.index] >= 0)
-    return [(leg, float(fastest[leg.index])) for leg in flown]
+    for leg in _long_legs(context):
+        between = leg.index in waypoints and leg.start.index != HOME and not leg.jump
+        if between and fastest[leg.index] >= 0:
+            yield leg, float(fastest[leg.index])
 
 
 def _long_legs(context: ValidationContext) -> Iterator[Straight]:

@@ -6,7 +6,7 @@ The words of a line, in any order but for the items, which are flown in theirs:
 - `max_altitude=50` and so forth: a limit; `airborne`; `home=LATITUDE,LONGITUDE,HEIGHT`, `homeless`;
 - `energy=WH,W`: what the flight takes of 100 Wh, 20 % of which are kept, and the least power;
 - `link`, `link.NAME=VALUE`: a plan that is delivered, but for a value of `LinkCheck`;
-- `fly:PACE;PLACE;PLACE,INDEX;...`: the flight is predicted at so many m/s towards these items;
+- `predicted`: the flight is; `fly:PACE;PLACE;PLACE,INDEX;...`: it is so, at m/s, to these items;
 - `square:SIDE,EAST`, `area:PLACE;...`, `disc:PLACE,RADIUS`: inclusions, the square about home or
   a place east of it; `zone:PLACE,RADIUS`: an exclusion; `rally:PLACE`, `back:PLACE`: where a
   return, and one after a breach, ends;
@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from faao_mav.autopilot import Track, Vehicle
+from faao_mav.autopilot.predict import predict
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
@@ -154,8 +155,8 @@ def given(line: str) -> Given:
         elif kind in named:
             named[kind] |= {head if kind == "max" else field: first[0]} if first else {}
             case["link"] = LINK if kind == "link" else case.get("link")
-        elif head == "airborne":
-            case["airborne"] = True
+        elif head in ("airborne", "predicted"):
+            case[head] = True
         elif head in ("home", "homeless"):
             home = Home(*first) if first else None
         elif head == "energy":
@@ -195,7 +196,10 @@ def given(line: str) -> Given:
     case["limits"] = Limits(**named["max"])
     if case.get("link") is not None:
         case["link"] = replace(LINK, **named["link"])
-    return Given(mission(*items, home=home, fence=fence, rally=tuple(parts["rally"])), **case)
+    told = mission(*items, home=home, fence=fence, rally=tuple(parts["rally"]))
+    if case.pop("predicted", False):
+        case["track"] = predict(told, case["vehicle"])
+    return Given(told, **case)
 
 
 def check(rule: str, trips: Given, item: int | None, passes: Given) -> None:

@@ -20,6 +20,7 @@ from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.validate import Finding, Level, ValidationContext, validate
+from faao_mav.validate.check import check
 
 DATA = Path(__file__).parent.parent / "data"
 CORPUS = DATA / "validate"
@@ -54,7 +55,7 @@ def test_each_file_gets_its_errors_and_warnings(row: list[str]) -> None:
     assert run.exit_code == (1 if json.loads(run.stdout)["errors"] else 0)
     pairs = [] if parameters == "-" else [pair.split("=") for pair in parameters.split()]
     vehicle = Vehicle(autopilot, kind, {name: float(value) for name, value in pairs})
-    found = validate(ValidationContext(read_mission(CORPUS / name), vehicle))
+    found = check(read_mission(CORPUS / name), vehicle).findings
     rules = sorted({finding.rule for finding in found if finding.level is not Level.NOTE})
     assert rules == ([] if expected == "-" else expected.split())
 
