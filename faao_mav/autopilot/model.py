@@ -93,10 +93,6 @@ class Model(ABC):
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg on which `speed`, m/s, is reached, m; same shape."""
 
-    @abstractmethod
-    def reachable_speed(self, length: Real) -> Real:
-        """Return the greatest speed reached on legs of `length`, m, in m/s; same shape."""
-
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         """Return acceptance radii, m, that suit waypoints; 0 leaves them to the autopilot.
 

@@ -69,9 +69,6 @@ class Toy(Px4):
     def shortest_leg(self, speed: Real) -> Real:
         return speed**2 / self.acceleration
 
-    def reachable_speed(self, length: Real) -> Real:
-        return np.sqrt(self.acceleration * length)
-
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
         return np.minimum(4.0, 0.4 * room) + 0 * turn
 

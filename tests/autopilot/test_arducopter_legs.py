@@ -139,8 +139,6 @@ def test_a_command_counts_up_to_what_a_leg_or_the_next_comes_to() -> None:
 
 def test_measured_lengths_of_legs() -> None:
     """Measured at 8 m/s: 49 m with default parameters, 22 m with ACCEL 400 and JERK 10."""
-    speeds = np.array([0.3, 1.0, 5.0, 12.0])
     for limits, length in (((2.5, 1.0), 49), ((4.0, 10.0), 22)):
         legs = ArduCopter(acceleration=limits[0], jerk=limits[1])
         assert legs.shortest_leg(np.array(8.0)) == pytest.approx(length, abs=1)
-        assert legs.reachable_speed(legs.shortest_leg(speeds)) == pytest.approx(speeds, rel=5e-3)

@@ -18,7 +18,6 @@ from faao_mav.autopilot.px4.guidance import (
     legs,
     level_setpoint,
     stopping_distance,
-    stopping_speed,
 )
 from faao_mav.autopilot.px4.parameters import Px4Limits
 from faao_mav.autopilot.stepper import STEP, Copter, Samples
@@ -97,11 +96,6 @@ class Px4(Px4Limits):
         14.4
         """
         return stopping_distance(self.jerk, self.acceleration, speed)
-
-    def reachable_speed(self, length: Real) -> Real:
-        """Return the speed from which it can stop within legs of `length`, m, in m/s."""
-        speeds = [stopping_speed(self.jerk, self.acceleration, way) for way in length.flat]
-        return np.reshape(np.array(speeds), np.shape(length))
 
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
         """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot.copter.legs import FASTEST, StraightLegs, largest, ramp
+from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, ramp
 from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.autopilot.ardupilot.copter.target import Target
 from faao_mav.autopilot.flight_path import FlightPath, Flown
@@ -55,10 +55,6 @@ class ArduCopter(ArduCopterLimits):
         48.0
         """
         return speed * ramp(self, speed, self.acceleration).duration
-
-    def reachable_speed(self, length: Real) -> Real:
-        """Return the speed that legs of `length`, m, reach, m/s; same shape."""
-        return largest(self.shortest_leg, length, FASTEST)
 
     def leg_durations(self, lengths: Real, joined: Flags) -> StraightLegs:
         """Return how long straight legs of `lengths`, m, take."""

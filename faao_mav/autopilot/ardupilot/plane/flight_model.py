@@ -89,10 +89,6 @@ class ArduPlane(Model):
         """Return the least length of a leg flown at `speed`, m: one look-ahead; same shape."""
         return self.look_ahead * speed
 
-    def reachable_speed(self, length: Real) -> Real:
-        """Return the speed at which legs of `length`, m, are not cut short, m/s; same shape."""
-        return length / self.look_ahead
-
     def true_airspeed(self, commanded: float, altitude: float) -> float:
         """Return the true airspeed, m/s, at which a `commanded` one is flown.
 
