@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.telemetry import Ending
+from faao_mav.fly.telemetry import PATIENCE, Ending
 from faao_mav.fly.watch import Watch
 from faao_mav.wire.messages import CommandAck, CommandLong, Heartbeat, Message, WireItem
 from faao_mav.wire.protocol import LOCAL_POSITION, MavCommand, command_result
@@ -45,7 +45,7 @@ class Start(Watch):
     """A watch that arms the vehicle and starts its mission.
 
     It does once the autopilot's own checks pass, it knows where it is, no other ground station was
-    heard and the gate before the flight, `readiness`, finds no error; after `patience` seconds of
+    heard and the gate before the flight, `readiness`, finds no error; after `PATIENCE` seconds of
     checks that do not pass it ends. Nothing is ever sent again, but what asks for telemetry, once
     the mode is one that was not asked for: then the pilot, or a failsafe, has the aircraft.
 
@@ -135,7 +135,7 @@ class Start(Watch):
         elif self.phase == "holding" and mode != self._before and self._order is not None:
             self._asked.discard(self._before)  # the start that was asked for has come
             if mode == self._modes.hold:
-                self._order, self._asked, self.seen.patience = None, {mode}, self._patience
+                self._order, self._asked, self.seen.patience = None, {mode}, PATIENCE
                 self.seen.told.append("it holds; interrupt again to leave it")
         return ()
 
@@ -184,7 +184,7 @@ class Start(Watch):
         if self._stopped():
             return ()
         lacks = self._lacks(now)
-        if waited >= self._patience:
+        if waited >= PATIENCE:
             said = "; ".join(dict.fromkeys(seen.said)) or lacks or "it does not say why"
             self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
             return ()

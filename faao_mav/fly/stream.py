@@ -13,6 +13,7 @@ from faao_mav.fly.itinerary import Itinerary
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.start import ACCEPTED, Order, Start
+from faao_mav.fly.telemetry import PATIENCE
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.wire.messages import (
@@ -69,11 +70,10 @@ class Stream(Start):
         readiness: Readiness,
         *,
         rate: float = 10.0,
-        patience: float = 60.0,
     ) -> None:
         plan = solution.plan
         finish = plan.mission.on_finish
-        super().__init__(peer, (), readiness, lands=finish != "hover", patience=patience, rate=rate)
+        super().__init__(peer, (), readiness, lands=finish != "hover", rate=rate)
         if self._modes.guided is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._guided, self._rules = self._modes.guided, self._family.setpoints
@@ -161,7 +161,7 @@ class Stream(Start):
         if self.phase == "starting" and result == ACCEPTED:
             self._begin()
         due, out = order.due, super()._answered(order, result, now)
-        if self.phase == "arming" and result != ACCEPTED and now < self._begun + self._patience:
+        if self.phase == "arming" and result != ACCEPTED and now < self._begun + PATIENCE:
             order.sent, order.due = 0, due
         return out
 
@@ -172,7 +172,7 @@ class Stream(Start):
         assert position is not None
         self._frame.home = position.alt - position.relative_alt
         climb = 0.0 if self._rules.takes_off_by_setpoints else self._height / _SLOW_CLIMB
-        self._sent_by = self._heard_at + self._patience + climb
+        self._sent_by = self._heard_at + PATIENCE + climb
 
     # ---- what the vehicle does
 
@@ -261,7 +261,7 @@ class Stream(Start):
         if self.phase == "engaging" and self._order is None and streamed:
             out += self._set_mode(now, self._guided)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
-            self._last_sent, self._sent_by = t, now + self._patience
+            self._last_sent, self._sent_by = t, now + PATIENCE
             self._first_sent = min(self._first_sent, t)
             out.append(self._frame.message(setpoint, position, self._peer.address))
         return out

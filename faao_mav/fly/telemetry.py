@@ -42,6 +42,10 @@ Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
 ]
 
+PATIENCE = 60.0
+"""Seconds after which nothing that has not come is waited for any more: a message, checks that
+pass, a setpoint that may be sent. Chosen."""
+
 _SILENT = 5.0
 """Seconds without any message after which the link counts as interrupted: five heartbeats."""
 
@@ -82,7 +86,7 @@ class Telemetry:
     """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
 
     Without `rows` its mission is not looked at. It is asked for `rate` positions a second. After
-    `patience` seconds without any message nothing more can be known.
+    `patience` seconds without any message, `PATIENCE` at first, nothing more can be known.
 
     `told` is what has happened and `said` what the vehicle said that is a warning or worse, in
     words, `fixes` where it was; `heartbeat`, `current`, `status` and `position` are the last of
@@ -94,12 +98,10 @@ class Telemetry:
     more can be known, None as long as something can.
     """
 
-    def __init__(
-        self, peer: Peer, rows: Sequence[WireItem], patience: float, rate: float = POSITION_RATE
-    ) -> None:
+    def __init__(self, peer: Peer, rows: Sequence[WireItem], rate: float = POSITION_RATE) -> None:
         assert peer.vehicle is not None
         self.vehicle = peer.vehicle
-        self._peer, self._rows, self.patience = peer, tuple(rows), patience
+        self._peer, self._rows, self.patience = peer, tuple(rows), PATIENCE
         self._home = home_items(self.vehicle, MissionType.MISSION)
         self.told: list[str] = []
         self.said: list[str] = []

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.telemetry import POSITION_RATE, Ending, Kind, Telemetry
+from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.machine import Machine, Progress
 from faao_mav.wire.messages import Envelope, Heartbeat, Message, MissionCurrent, WireItem
@@ -32,7 +32,7 @@ class Watch(Machine[Ending]):
     """A machine that watches the vehicle of `peer` fly the mission `rows` to its end.
 
     `rows` are the items that it holds, the home row included where it has one. `lands`: the flight
-    ends on the ground. After `patience` seconds without a message it ends. `seen` is what it has
+    ends on the ground. After `PATIENCE` seconds without a message it ends. `seen` is what it has
     heard; it asks for `rate` positions a second. Nothing else is sent: somebody else arms and
     starts it. What stands against that, `readiness` says meanwhile, where it is given.
 
@@ -50,7 +50,6 @@ class Watch(Machine[Ending]):
         readiness: Readiness | None = None,
         *,
         lands: bool = True,
-        patience: float = 60.0,
         rate: float = POSITION_RATE,
     ) -> None:
         super().__init__()
@@ -58,8 +57,8 @@ class Watch(Machine[Ending]):
         self._peer, self._modes, self._family = peer, peer.vehicle.modes, peer.vehicle.family
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
-        self._lands, self._patience, self._ready = lands, patience, readiness
-        self.seen = Telemetry(peer, rows, patience, rate)
+        self._lands, self._ready = lands, readiness
+        self.seen = Telemetry(peer, rows, rate)
         self.phase: Phase = "waiting"
         self.relay_start: float | None = None
         """When the plan's clock read 0, s on the vehicle's, where that is known."""
@@ -168,7 +167,7 @@ class Watch(Machine[Ending]):
 
     def _step_aside(self) -> None:
         """Send nothing more."""
-        self.phase, self.seen.patience = "aside", self._patience
+        self.phase, self.seen.patience = "aside", PATIENCE
         who = "the pilot or a failsafe has the aircraft; nothing more is sent"
         self.seen.told.append(f"mode {self.seen.mode}: {who}")
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 from conftest import FLYABLE, edited
@@ -282,6 +282,33 @@ def during(
 
 def is_setpoint(message: object) -> bool:
     return isinstance(message, SetPositionTargetLocalNed)
+
+
+Change: TypeAlias = Callable[[GlobalPositionInt], GlobalPositionInt]
+
+
+def stuck() -> Change:
+    first: list[GlobalPositionInt] = []
+
+    def change(told: GlobalPositionInt) -> GlobalPositionInt:
+        first.append(told)
+        return replace(first[0], time_boot_ms=told.time_boot_ms)
+
+    return change
+
+
+def leap(seconds: float) -> Change:
+    by = round(1000 * seconds)
+    return lambda told: replace(told, time_boot_ms=max(told.time_boot_ms + by, 0))
+
+
+CHANGES: dict[str, Callable[..., Change]] = {
+    "jump": lambda metres: lambda told: replace(told, lat=told.lat + round(metres * METRE)),
+    "stuck": stuck,
+    "leap": leap,
+    "higher": lambda m: lambda told: replace(told, relative_alt=told.relative_alt - int(1000 * m)),
+}
+"""What becomes of positions: the place jumps or stands, the clock leaps, or home moves."""
 
 
 def arms(message: object, wanted: float | None = None) -> bool:

@@ -54,7 +54,7 @@ def found(
     mock = mock or holding(mission)
     allowed = {name: changes.pop(name, False) for name in ("elsewhere", "untimed")}
     held, told = changes.pop("held", held_by(mock)), {"battery": 100, "armed": False} | changes
-    seen = Telemetry(peer_of(mock.behaviour.family.key), (), 60.0)
+    seen = Telemetry(peer_of(mock.behaviour.family.key), ())
     seen.place = told.get("place", HOME)
     seen.stations = {*told.get("stations", ())}
     if told["battery"] is not None:

@@ -17,13 +17,23 @@ what was told (`says`), the ending's `text`, the gate's findings (`finds`), mode
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import pytest
-from scenes import METRE, AnotherStation, Scene, arms, away, during, is_setpoint, low, starts, swift
+from scenes import (
+    CHANGES,
+    AnotherStation,
+    Scene,
+    arms,
+    away,
+    during,
+    is_setpoint,
+    low,
+    starts,
+    swift,
+)
 from scenes import under as with_plan
 from simulate import Station
 from stations import FOREIGN, HOME, RALLY, a_mission, rows_for, vehicle_of
@@ -50,7 +60,6 @@ ORDERS: dict[str, tuple[int, float]] = {
     "disarm": (MavCommand.ARM, 0.0),
     "start": (MavCommand.START, 0.0),
 }
-Change: TypeAlias = Callable[[GlobalPositionInt], GlobalPositionInt]
 FAULTS = ("loss", "seed", "reordering", "delay")
 FAR = MissionItem(16, 3, x=HOME.latitude + 0.01, y=HOME.longitude, z=30.0)
 MISSIONS = {
@@ -175,25 +184,6 @@ class Stage:
         """Return the kind of the ending; `looks` are called at their times."""
         events = [*self.events, *looks]
         return self.scene.run(self.faults, self.until, events=events, others=self.others) or "-"
-
-
-def stuck() -> Change:
-    first: list[GlobalPositionInt] = []
-
-    def change(told: GlobalPositionInt) -> GlobalPositionInt:
-        first.append(told)
-        return replace(first[0], time_boot_ms=told.time_boot_ms)
-
-    return change
-
-
-CHANGES: dict[str, Callable[..., Change]] = {
-    "jump": lambda: lambda told: replace(told, lat=told.lat + int(100 * METRE)),
-    "stuck": stuck,
-    "late": lambda: lambda told: replace(told, time_boot_ms=max(0, told.time_boot_ms - 5000)),
-    "leap": lambda s: lambda told: replace(told, time_boot_ms=told.time_boot_ms + int(1000 * s)),
-    "higher": lambda m: lambda told: replace(told, relative_alt=told.relative_alt - int(1000 * m)),
-}
 
 
 @pytest.mark.parametrize(("flies", "kind", "given", "happens", "becomes"), [*rows()])

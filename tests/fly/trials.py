@@ -9,10 +9,12 @@ from typing import Any, get_args
 import numpy as np
 from conftest import FLYABLE, edited
 from scenes import (
+    CHANGES,
     LOITER,
     METRE,
     SWIFT,
     AnotherStation,
+    Change,
     Scene,
     arms,
     during,
@@ -299,25 +301,13 @@ def happens(
             scene.tells(during(begin, begin + random.choice((2.0, 15.0, 1e9)), changed))
 
 
-Change = Callable[[GlobalPositionInt], GlobalPositionInt]
-
-
 def change(name: str, random: Random) -> Change:
     """Return what becomes of positions: home moves, the place jumps, stands, or the clock leaps."""
-    first: list[GlobalPositionInt] = []
-
-    def stuck(told: GlobalPositionInt) -> GlobalPositionInt:
-        first.append(told)
-        return replace(first[0], time_boot_ms=told.time_boot_ms)
-
     match name:
         case "home":
-            risen = random.choice((-100_000, -5_000, 5_000, 100_000))
-            return lambda told: replace(told, relative_alt=told.relative_alt - risen)
+            return CHANGES["higher"](random.choice((-100, -5, 5, 100)))
         case "glitch":
-            metres = random.choice((20.0, 100.0, 1000.0))
-            return lambda told: replace(told, lat=told.lat + round(metres * METRE))
+            return CHANGES["jump"](random.choice((20.0, 100.0, 1000.0)))
         case "leap":
-            leap = random.choice((-60_000, -1_000, 1_000, 20_000, 1_000_000))
-            return lambda told: replace(told, time_boot_ms=max(told.time_boot_ms + leap, 0))
-    return stuck
+            return CHANGES["leap"](random.choice((-60, -1, 1, 20, 1_000)))
+    return CHANGES["stuck"]()
