@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from faao_mav.app.charts import charts, thinned
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Track
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
@@ -23,12 +23,8 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.zones import PolygonZone
 from faao_mav.report import write_part
-from faao_mav.validate.energy import energy_use
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result, plan_mission
-
-_MOST_DRAWN = 400
-"""Points of a line on the map and of a chart; chosen: more cannot be told apart."""
 
 _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on the map."""
@@ -53,8 +49,8 @@ class Answer:
 
     `refused` is the error of a plan that cannot be used, `failed` that of one without a flight.
     `delivered` is in bit/s/Hz, `megabytes` None without a bandwidth. `drawing` has the lines of
-    the map in [latitude, longitude], `series` the charts' values by name over `t`, s. `result` is
-    there in the finished answer only.
+    the map in [latitude, longitude], and times, s, and speeds, m/s, at its places; `charts` are
+    options of ECharts. `result` is there in the finished answer only.
     """
 
     refused: str = ""
@@ -62,7 +58,7 @@ class Answer:
     delivered: float = 0.0
     megabytes: float | None = None
     drawing: dict[str, Any] = field(default_factory=dict)
-    series: dict[str, list[float]] = field(default_factory=dict)
+    charts: dict[str, Any] = field(default_factory=dict)
     velocities: Real | None = None
     result: Result | None = None
 
@@ -90,34 +86,10 @@ def _answered(text: str, source: str, solve: Callable[[Plan], RoughFlight | Resu
         delivered=flight.delivered_rate,
         megabytes=flight.plan.megabytes(flight.delivered_rate),
         drawing=_drawing(flight, result),
-        series=_series(flight),
+        charts=charts(flight),
         velocities=flight.v,
         result=result,
     )
-
-
-def _series(flight: RoughFlight | Solution) -> dict[str, list[float]]:
-    """Return the charts' values: bit/s/Hz, m/s, W, Wh; bit/Hz, or megabytes with a bandwidth."""
-    plan, relayed = flight.plan, flight.relayed
-    bandwidth, step = plan.radio.bandwidth_mhz, plan.flight.time_step
-    held = step * (1.0 if bandwidth is None else bandwidth / 8)
-    values = {
-        "t": flight.t,
-        "base station to UAV": flight.I_U,
-        "UAV to user": flight.I_G,
-        "queue": held * relayed.queue,
-        "delivered": held * np.cumsum(relayed.forwarded),
-        "speed": lengths(flight.v),
-        "east": flight.w[:, 0],
-        "north": flight.w[:, 1],
-    }
-    level = np.zeros((len(flight.t), 1))
-    position, velocity = np.hstack([flight.w, level]), np.hstack([flight.v, level])
-    frame, items = LocalFrame(plan.origin.latitude, plan.origin.longitude), level[:, 0].astype(int)
-    track = Track(flight.t, position, velocity, items, np.empty(0), frame)
-    if (use := energy_use(plan, track, plan.wind)) is not None:
-        values |= {"power": use.power, "energy": use.used}
-    return {name: thinned(np.asarray(each)).round(4).tolist() for name, each in values.items()}
 
 
 def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str, Any]:
@@ -131,6 +103,7 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
     speeds = lengths(flight.v)
     drawn = {
         "places": degrees(thinned(flight.w)),
+        "times": thinned(flight.t).round(3).tolist(),
         "speeds": thinned(speeds).round(3).tolist(),
         "top": max(float(speeds.max()), 0.01),
         "track": [],
@@ -159,18 +132,9 @@ def _zones_of_file(plan: Plan) -> list[Area]:
     """Return the zones of the fence that are of its file: of each shape they come last."""
     assert plan.fence is not None
     own = (*plan.fence.inclusion, *plan.fence.exclusion)
-    own_polygons, all_polygons = (
-        sum(isinstance(zone, PolygonZone) for zone in own),
-        len(plan.geofence.polygons),
-    )
-    polygons, circles = plan.zones[:all_polygons], plan.zones[all_polygons:]
-    return [*polygons[own_polygons:], *circles[len(own) - own_polygons :]]
-
-
-def thinned(values: Real) -> Real:
-    """Return at most `_MOST_DRAWN` of `values` (n, ...), the first and the last among them."""
-    kept = np.linspace(0, len(values) - 1, min(len(values), _MOST_DRAWN)).round().astype(int)
-    return np.asarray(values[kept])
+    drawn = sum(isinstance(zone, PolygonZone) for zone in own)
+    polygons = len(plan.geofence.polygons)
+    return [*plan.zones[drawn:polygons], *plan.zones[polygons + len(own) - drawn :]]
 
 
 def made(result: Result, wanted: str) -> tuple[str, bytes]:

@@ -2,15 +2,15 @@
 
 from typing import Any
 
-_PLOTS = (
-    (("base station to UAV", "UAV to user"), "bit/s/Hz"),
-    (("queue",), "{unit}"),
-    (("delivered",), "{unit}"),
-    (("speed",), "m/s"),
-    (("power",), "W"),
-    (("energy",), "Wh"),
-)
-"""The curves of each plot, with their unit; those without values are left out."""
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.autopilot import Track
+from faao_mav.geodesy import LocalFrame
+from faao_mav.optimizer.rough import RoughFlight
+from faao_mav.optimizer.solution import Solution
+from faao_mav.validate.energy import energy_use
+from faao_mav.vector import lengths
 
 _HEIGHT, _ABOVE, _WIDE = 70, 50, 560
 """Height of a plot and of what is above it, and from where on two are side by side, in pixels.
@@ -18,53 +18,79 @@ Chosen."""
 
 _GREY = "#888"
 _COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a", "#c9a227", "#4a9aa8")
-"""Of each curve, in the order of `_PLOTS`."""
+"""Of each curve, in the order of the plots."""
+
+_MOST_DRAWN = 400
+"""Points of a line on the map and of a chart; chosen: more cannot be told apart."""
 
 
-def options(series: dict[str, list[float]], unit: str) -> dict[str, Any]:
-    """Return the charts of `series` over its `t`, s; amounts of data are in `unit`."""
-    plots = [plot for plot in _PLOTS if plot[0][0] in series]
+def thinned(values: Real) -> Real:
+    """Return at most `_MOST_DRAWN` of `values` (n, ...), the first and the last among them."""
+    kept = np.linspace(0, len(values) - 1, min(len(values), _MOST_DRAWN)).round().astype(int)
+    return np.asarray(values[kept])
+
+
+def charts(flight: RoughFlight | Solution) -> dict[str, Any]:
+    """Return the charts of `flight` over time, s."""
+    plots = _plots(flight)
     axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
             "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
     xs: list[dict[str, Any]] = []
     ys: list[dict[str, Any]] = []
     curves: list[dict[str, Any]] = []
-    for k, (names, of) in enumerate(plots):
+    for k, (values, unit) in enumerate(plots):
         colours = _COLOURS[len(curves) :]
-        title = ", ".join(f"{{c{n}|━}} {name}" for n, name in enumerate(names))
-        marks = {f"c{n}": {"color": colours[n], "fontWeight": "bold"} for n in range(len(names))}
+        title = ", ".join(f"{{c{n}|━}} {name}" for n, name in enumerate(values))
+        marks = {f"c{n}": {"color": colours[n], "fontWeight": "bold"} for n in range(len(values))}
         xs.append({**axis, "gridIndex": k, "max": "dataMax"})
-        ys.append({**axis, "gridIndex": k, "min": 0, "nameGap": 10,
-                   "name": f"{title}, {of.format(unit=unit)}",
+        ys.append({**axis, "gridIndex": k, "min": 0, "nameGap": 10, "name": f"{title}, {unit}",
                    "nameTextStyle": {"align": "left", "color": _GREY, "rich": marks}})  # fmt: skip
-        for name in names:
-            curve = [list(pair) for pair in zip(series["t"], series[name], strict=True)]
+        for name, curve in values.items():
+            points = thinned(np.stack([flight.t, curve], axis=1)).round(4).tolist()
             curves.append({"type": "line", "name": name, "xAxisIndex": k, "yAxisIndex": k,
-                           "showSymbol": False, "data": curve})  # fmt: skip
-    grids = {columns: _grids(len(plots), columns) for columns in (1, 2)}
+                           "showSymbol": False, "data": points})  # fmt: skip
     return {
         "baseOption": {
             "animation": False,
             "color": _COLOURS,
             "tooltip": {"trigger": "axis", "confine": True},
             "axisPointer": {"link": [{"xAxisIndex": "all"}]},
-            "grid": grids[2],
             "xAxis": xs,
             "yAxis": ys,
             "series": curves,
         },
         "media": [
-            {"query": {"maxWidth": _WIDE}, "option": {"grid": grids[1]}},
-            {"option": {"grid": grids[2]}},
+            {"query": {"maxWidth": _WIDE}, "option": {"grid": _grids(len(plots), 1)}},
+            {"option": {"grid": _grids(len(plots), 2)}},
         ],
     }
 
 
-def heights(series: dict[str, list[float]]) -> str:
-    """Return the height of all charts of `series` as CSS: in one column, and in two."""
-    plots = sum(names[0] in series for names, _ in _PLOTS)
-    row = _HEIGHT + _ABOVE
+def heights(charts: dict[str, Any]) -> str:
+    """Return the height of all `charts` as CSS: in one column, and in two."""
+    plots, row = len(charts["baseOption"]["xAxis"]), _HEIGHT + _ABOVE
     return f"--narrow: {plots * row}px; --wide: {-(-plots // 2) * row}px"
+
+
+def _plots(flight: RoughFlight | Solution) -> list[tuple[dict[str, Real], str]]:
+    """Return the curves of each plot by name, and their unit."""
+    plan, relayed = flight.plan, flight.relayed
+    bandwidth, held, unit = plan.radio.bandwidth_mhz, plan.flight.time_step, "bit/Hz"
+    if bandwidth is not None:
+        held, unit = held * bandwidth / 8, "MB"
+    plots = [
+        ({"base station to UAV": flight.I_U, "UAV to user": flight.I_G}, "bit/s/Hz"),
+        ({"queue": held * relayed.queue}, unit),
+        ({"delivered": held * np.cumsum(relayed.forwarded)}, unit),
+        ({"speed": lengths(flight.v)}, "m/s"),
+    ]
+    level = np.zeros((len(flight.t), 1))
+    position, velocity = np.hstack([flight.w, level]), np.hstack([flight.v, level])
+    frame, items = LocalFrame(plan.origin.latitude, plan.origin.longitude), level[:, 0].astype(int)
+    track = Track(flight.t, position, velocity, items, np.empty(0), frame)
+    if (use := energy_use(plan, track, plan.wind)) is not None:
+        plots += [({"power": use.power}, "W"), ({"energy": use.used}, "Wh")]
+    return plots
 
 
 def _grids(count: int, columns: int) -> list[dict[str, object]]:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from nicegui import events, ui
 
-from faao_mav.app import charts
 from faao_mav.app.answers import FILES, Answer, made
+from faao_mav.app.charts import heights
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.fly import Fly
 from faao_mav.app.form import Form, fields
@@ -124,7 +124,7 @@ class Page:
             self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
             self._slider.props('aria-label="Time of the flight"')
             self._now = ui.label().classes("now")
-        self._chart, self._heights = ui.echart({}).classes("charts"), ""
+        self._chart, self._height = ui.echart({}).classes("charts"), ""
 
     def _side_part(self) -> None:
         self._failed = ui.label().classes("failed").props('role="alert"')
@@ -144,7 +144,7 @@ class Page:
     def _changed(self, *, soon: bool = True) -> None:
         """Ask for what the document leads to; what was found before is no longer of it."""
         document = self._document
-        self._answer = Answer(drawing=self._answer.drawing, series=self._answer.series)
+        self._answer = Answer(drawing=self._answer.drawing)
         self._form.show()
         self._draw_scene()
         self._name.text = document.shown(("name",)) or Path(document.source).name
@@ -184,17 +184,12 @@ class Page:
         self._rate.props["data-delivered"] = repr(answer.delivered)
         self._say("finished" if answer.result is not None else "rough")
         self._map.run_method("flight", answer.drawing)
-        unit, heights = (
-            "bit/Hz" if answer.megabytes is None else "MB",
-            charts.heights(answer.series),
-        )
-        others = heights != self._heights  # other plots than before
-        if others:
-            self._heights = heights
-            self._chart.style(replace=heights)
+        if (height := heights(answer.charts)) != self._height:  # other plots than before
+            self._height = height
+            self._chart.style(replace=height)
         # behind the route, which is to be drawn first
-        self._chart.run_chart_method("setOption", charts.options(answer.series, unit), others)
-        self._slider.props["max"] = len(answer.series["t"]) - 1
+        self._chart.run_chart_method("setOption", answer.charts, True)
+        self._slider.props["max"] = len(answer.drawing["times"]) - 1
         self._slider.update()
         self._at_time()
         if answer.result is not None:
@@ -235,15 +230,13 @@ class Page:
         self._where.text = text
 
     def _at_time(self) -> None:
-        series, k = self._answer.series, int(self._slider.value)
-        if not k or k >= len(series.get("t", ())):
-            self._map.run_method("place_aircraft", None)
-            self._now.text = ""
-            return
-        self._map.run_method("place_aircraft", self._answer.drawing["places"][k])
-        tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
-        self._chart.run_chart_method("dispatchAction", tip)
-        self._now.text = f"{series['t'][k]:.1f} s, {series['speed'][k]:.2f} m/s"
+        drawn, k = self._answer.drawing, int(self._slider.value)
+        flown = 0 < k < len(drawn.get("times", ()))
+        self._map.run_method("place_aircraft", drawn["places"][k] if flown else None)
+        self._now.text = f"{drawn['times'][k]:.1f} s, {drawn['speeds'][k]:.2f} m/s" if flown else ""
+        if flown:
+            tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
+            self._chart.run_chart_method("dispatchAction", tip)
 
     def _show_background(self, event: events.ValueChangeEventArguments[Any]) -> None:
         self._map.run_method("background", asdict(self._background) if event.value else None)

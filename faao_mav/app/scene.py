@@ -47,19 +47,17 @@ class Scene:
         """Return the zones of the fence: key, inclusion, and corners or center and radius."""
         found = []
         for path, inclusion, value in self._listed():
-            zone: dict[str, Any] = {"key": "/".join(map(str, path)), "inclusion": inclusion}
-            if isinstance(value, list):
-                corners = [self.degrees(each) for each in value]
-            elif isinstance(value, dict) and "polygon" in value:
-                corners = [self.degrees(each) for each in value["polygon"] or ()]
-            else:
-                at = self.degrees(value.get("center") if isinstance(value, dict) else None)
-                radius = value.get("radius") if isinstance(value, dict) else None
-                if at and isinstance(radius, int | float) and 0 < radius < math.inf:
-                    found.append(zone | {"center": at, "radius": radius})
+            zone = {"key": "/".join(map(str, path)), "inclusion": inclusion}
+            held = value if isinstance(value, dict) else {"polygon": value}
+            if "polygon" in held:
+                ring = held["polygon"] if isinstance(held["polygon"], list) else []
+                corners = [self.degrees(each) for each in ring]
+                if len(corners) > 2 and all(corners):
+                    found.append(zone | {"corners": corners})
                 continue
-            if len(corners) > 2 and all(corners):
-                found.append(zone | {"corners": corners})
+            at, radius = self.degrees(held.get("center")), held.get("radius")
+            if at and isinstance(radius, int | float) and 0 < radius < math.inf:
+                found.append(zone | {"center": at, "radius": radius})
         return found
 
     def move(self, kind: str, at: list[float], gesture: object) -> None:

@@ -147,6 +147,8 @@ def test_zones_are_drawn_changed_and_removed() -> None:
     odd = Document(f"{SMALL}fence: {{exclusion: 3}}\n")
     Scene(odd).change(circle, None)
     assert odd.value(("fence", "exclusion")) == [{"center": [20.0, 30.0], "radius": 4.0}]
+    ringless = "fence: {exclusion: [{polygon: 3}, {center: 3}, 7]}\n"
+    assert Scene(Document(SMALL + ringless)).zones() == []
     nowhere = Document("site: {}\n")
     Scene(nowhere).change(circle, None)
     Scene(nowhere).move("user", [1.0, 2.0], None)
