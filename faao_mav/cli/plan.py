@@ -1,8 +1,6 @@
 """`faao-mission PLAN.yaml --out MISSION`: from a plan to a mission file."""
 
 import sys
-import time
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,15 +14,16 @@ from faao_mav.cli.shared import (
     exit_status,
     flag,
     note,
+    optimizer_progress,
     option,
     show,
 )
+from faao_mav.cli.transfers import as_dict, send
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
-    from faao_mav.wire.client import UploadReport
     from faao_mav.workflow import Result
 
 
@@ -71,8 +70,6 @@ def plan(
     validation found errors, or it is not known to be on the vehicle; 2 unusable arguments or
     input.
     """
-    from faao_mav.cli.shared import optimizer_progress
-    from faao_mav.cli.transfers import as_dict as upload_as_dict
     from faao_mav.report import summary, write_part
     from faao_mav.workflow import plan_mission
 
@@ -84,7 +81,6 @@ def plan(
     to_fly = out is not None or upload is not None
     if force and not to_fly:
         raise InputError("--force: is for a mission; give --out MISSION or --upload CONNECTION too")
-    started = time.perf_counter()
     plan = _checked_plan(plan_file, method, out, files, upload, force)
     with optimizer_progress(shown=shown) as observe:
         result = plan_mission(plan, bound=bound, observe=observe)
@@ -92,22 +88,24 @@ def plan(
             if path is not None:
                 write_part(result, name.removeprefix("--"), path)
         mission = result.write(out) if out is not None else ()
-    result = replace(result, seconds_total=time.perf_counter() - started)
     written = [*mission, *filter(None, files.values())]
     if to_fly and result.no_mission is not None:
         raise result.no_mission
     sound = not to_fly or _sound(result)
     uploaded, failure = None, None
-    if upload is not None and sound:
-        try:
-            from faao_mav.wire.upload_text import upload_text
+    if upload is not None and sound and result.conversion is not None:
+        from faao_mav.fly.seen import Flight
+        from faao_mav.wire.upload_text import upload_text
 
-            uploaded = _upload(result, upload, system, allow_armed, shown)
+        flight = Flight.planned(result.conversion, result.solution)
+        options = {"system": system, "allow_armed": allow_armed, "made_for": flight.made_for}
+        try:
+            uploaded = send(flight.mission, upload, shown=shown, **options)
         except FaaoError as error:  # told after the result
             failure = error
     if not quiet or as_json:
         show(
-            lambda: result.as_dict() | {"upload": upload_as_dict(uploaded) if uploaded else None},
+            lambda: result.as_dict() | {"upload": as_dict(uploaded) if uploaded else None},
             lambda: [
                 summary(result, written, precoders, verbose=verbose),
                 *([upload_text(uploaded)] if uploaded else []),
@@ -173,26 +171,3 @@ def _sound(result: "Result") -> bool:
     if errors:
         note("the mission does not pass validation; do not fly it")
     return not errors
-
-
-def _upload(
-    result: "Result", connection: str, system: int | None, allow_armed: bool, shown: bool
-) -> "UploadReport":
-    from faao_mav.cli.shared import transfer_progress
-    from faao_mav.fly.seen import Flight
-    from faao_mav.wire.client import upload
-
-    assert result.conversion is not None
-    flight = Flight.planned(result.conversion, result.solution)
-    with transfer_progress(shown=shown) as observe:
-        report = upload(
-            flight.mission,
-            connection,
-            system=system,
-            allow_armed=allow_armed,
-            made_for=flight.made_for,
-            observe=observe,
-        )
-    if not report.verified:
-        note("the mission is not verified; do not fly it")
-    return report

@@ -23,6 +23,7 @@ from faao_mav.cli.shared import (
 )
 
 if TYPE_CHECKING:
+    from faao_mav.mission.item import Mission
     from faao_mav.wire.client import UploadReport
 
 
@@ -54,29 +55,36 @@ def upload(
     """
     from faao_mav.autopilot.files import made_for
     from faao_mav.mission.formats.parameter_file import read_parameters
-    from faao_mav.wire.client import upload as run
     from faao_mav.wire.parameters import check_settable
     from faao_mav.wire.upload_text import upload_text
 
     file = read_noted(mission_file)
     values = None if parameters is None else read_parameters(parameters)
     check_settable(values or (), parameters)
-    with transfer_progress(shown=sys.stderr.isatty() and not as_json) as observe:
-        report = run(
-            file.mission,
-            to,
-            allow_armed=allow_armed,
-            made_for=made_for(mission_file, file),
-            parameters=values,
-            clear_rest=clear_rest,
-            observe=observe,
-            **link,
-        )
+    report = send(
+        file.mission,
+        to,
+        shown=sys.stderr.isatty() and not as_json,
+        allow_armed=allow_armed,
+        made_for=made_for(mission_file, file),
+        parameters=values,
+        clear_rest=clear_rest,
+        **link,
+    )
     show(lambda: as_dict(report), lambda: [upload_text(report)], as_json=as_json)
     if not report.verified:
-        if not as_json:
-            note("the mission is not verified; do not fly it")
         raise typer.Exit(1)
+
+
+def send(mission: "Mission", to: str, *, shown: bool, **options: Any) -> "UploadReport":
+    """Upload a mission and verify it, with progress where that is `shown`; see `upload` there."""
+    from faao_mav.wire.client import upload as run
+
+    with transfer_progress(shown=shown) as observe:
+        report = run(mission, to, observe=observe, **options)
+    if not report.verified:
+        note("the mission is not verified; do not fly it")
+    return report
 
 
 def as_dict(report: "UploadReport") -> dict[str, Any]:
