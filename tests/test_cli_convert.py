@@ -31,15 +31,6 @@ def test_a_plan_becomes_a_text_file_and_says_what_it_lost(tmp_path: Path) -> Non
     assert read_mission(out).fence == read_mission(MISSIONS / "fence_and_rally.plan").fence
 
 
-def test_there_and_back_is_the_same(tmp_path: Path) -> None:
-    first = MISSIONS / "plain.waypoints"
-    plan, last = tmp_path / "m.plan", tmp_path / "m.txt"
-    assert run(first, "--out", plan, "--autopilot", "ardupilot").stderr == ""
-    assert run(plan, "--out", last).stderr == ""
-    assert read_mission(last) == read_mission(plan) == read_mission(first)
-    assert read_mission_file(plan).firmware == 3
-
-
 def test_whom_a_plan_is_for(tmp_path: Path) -> None:
     out = tmp_path / "m.plan"
     result = run(MISSIONS / "plain.waypoints", "--out", out)

@@ -65,33 +65,26 @@ def test_a_mission_is_checked_when_it_is_written(plan: Path, out: Path) -> None:
     assert found["upload"] is None
 
 
-def test_warnings_are_in_the_summary(plan: Path, out: Path) -> None:
+def test_a_mission_with_errors_is_kept_but_not_called_good(plan: Path, out: Path) -> None:
     plan.write_text(edited(GENTLE, {"mission.takeoff": False}))
-    result = run(plan, "--out", out)
-    assert result.exit_code == 0
-    assert "checks       1 warning" in result.stdout
-    assert "             warning: there is no take-off" in result.stdout
-    assert result.stderr == ""
-
-
-@pytest.mark.parametrize("options", [[], ["--json"], ["--quiet"]])
-def test_a_mission_with_errors_is_kept_but_not_called_good(
-    plan: Path, out: Path, options: list[str]
-) -> None:
+    warned = run(plan, "--out", out)
+    assert (warned.exit_code, warned.stderr) == (0, "")
+    assert "checks       1 warning" in warned.stdout
+    assert "             warning: there is no take-off" in warned.stdout
     flat = {"vehicle.power": {}, "vehicle.battery": {"capacity_wh": 1}}
     plan.write_text(edited(GENTLE, flat))
-    port = free_port()
-    result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
-    assert result.exit_code == 1
-    assert re.search(r"^faao-mission: error: .* \[battery-reserve\]; ", result.stderr, re.M)
-    assert "does not pass validation; do not fly it" in result.stderr
-    assert read_mission(out).items
-    if "--json" in options:
-        found = json.loads(result.stdout)
-        assert found["validation"][0]["level"] == "error"
-        assert found["upload"] is None
-    else:
-        assert ("checks       1 error" in result.stdout) is not ("--quiet" in options)
+    for option in ("--verbose", "--json", "--quiet"):
+        result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{free_port()}", option)
+        assert result.exit_code == 1
+        assert re.search(r"^faao-mission: error: .* \[battery-reserve\]; ", result.stderr, re.M)
+        assert "does not pass validation; do not fly it" in result.stderr
+        assert read_mission(out).items
+        if option == "--json":
+            found = json.loads(result.stdout)
+            assert found["validation"][0]["level"] == "error"
+            assert found["upload"] is None
+        else:
+            assert ("checks       1 error" in result.stdout) is (option == "--verbose")
 
 
 def test_a_download_brings_the_fence_in_a_file_of_its_own(tmp_path: Path) -> None:
@@ -128,23 +121,23 @@ def test_a_planes_mission_on_a_plane(out: Path, tmp_path: Path) -> None:
     assert told["vehicle"]["type"] == "plane"
 
 
-@pytest.mark.parametrize("option", ["--out", "--upload"])
 def test_a_plan_beyond_the_vehicle_is_refused_before_the_work(
-    plan: Path, out: Path, option: str, monkeypatch: pytest.MonkeyPatch
+    plan: Path, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("faao_mav.workflow.plan_mission", lambda *_, **__: pytest.fail("worked"))
     beyond = {"vehicle.max_speed": 22, "vehicle.max_acceleration": 5.5}
     plan.write_text(edited(GENTLE, beyond))
-    result = run(plan, option, out if option == "--out" else f"udpout:127.0.0.1:{free_port()}")
-    assert (result.exit_code, result.stdout) == (2, "")
     end = "give that or less, or --force to make the mission all the same"
-    assert result.stderr.splitlines() == [
-        f"faao-mission: {plan}: vehicle.max_speed: 22 m/s; ArduCopter keeps plans of at most "
-        f"20 m/s (the most that it is told); {end}",
-        f"{plan}: vehicle.max_acceleration: 5.5 m/s^2; ArduCopter keeps plans of at most 5 m/s^2 "
-        f"(WP_ACC); {end}",
-    ]
-    assert not out.exists()
+    for where in (("--out", out), ("--upload", f"udpout:127.0.0.1:{free_port()}")):
+        result = run(plan, *where)
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert result.stderr.splitlines() == [
+            f"faao-mission: {plan}: vehicle.max_speed: 22 m/s; ArduCopter keeps plans of at most "
+            f"20 m/s (the most that it is told); {end}",
+            f"{plan}: vehicle.max_acceleration: 5.5 m/s^2; ArduCopter keeps plans of at most "
+            f"5 m/s^2 (WP_ACC); {end}",
+        ]
+        assert not out.exists()
 
 
 def test_what_only_the_simulators_airframe_cannot_fly_is_a_note(plan: Path, out: Path) -> None:
@@ -157,22 +150,19 @@ def test_what_only_the_simulators_airframe_cannot_fly_is_a_note(plan: Path, out:
     assert {e["level"] for e in told["validation"]} <= {"note", "warning"}
 
 
-@pytest.mark.parametrize("as_json", [False, True])
-def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path, as_json: bool) -> None:
+def test_an_upload_that_fails_leaves_the_files(plan: Path, out: Path) -> None:
     port = free_port()
     mock = MockAutopilot(
         behaviour_of("ardupilot", refusals={(0, 2): MavResult.UNSUPPORTED}), home=HOME, beat=0.1
     )
+    asked = (plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}")
     with running(mock, f"udpin:127.0.0.1:{port}"):
-        options = ["--json"] if as_json else []
-        result = run(plan, "--out", out, "--upload", f"udpout:127.0.0.1:{port}", *options)
-    assert result.exit_code == 1
+        result, told = run(*asked), run(*asked, "--json")
+    assert result.exit_code == told.exit_code == 1
     assert "the mission is not verified; do not fly it" in result.stderr
+    assert "failed       mission: refused: UNSUPPORTED" in result.stdout
+    assert json.loads(told.stdout)["upload"]["verified"] is False
     assert read_mission(out).items
-    if as_json:
-        assert json.loads(result.stdout)["upload"]["verified"] is False
-    else:
-        assert "failed       mission: refused: UNSUPPORTED" in result.stdout
 
 
 def test_a_vehicle_in_flight_keeps_its_mission(plan: Path, out: Path) -> None:

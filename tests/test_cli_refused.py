@@ -18,6 +18,8 @@ plan.yaml --out x.gpx | x.gpx: '.gpx'; expected a name that ends in .waypoints o
 plan.yaml --out x | no ending
 plan.yaml --out absent/x.txt | there is no directory absent
 plan.yaml --save x.yaml | --save x.yaml: give a name that ends in .npz
+plan.yaml --out m.txt --report r.pdf | --report r.pdf: give a name that ends in .html
+plan.yaml --out m.txt --figure f.jpg | --figure f.jpg: give a name that ends in .png
 plan.yaml --method magic | optimizer.method: 'magic' is not accepted; give direct or
 plan.yaml --method algorithm1 | radio.fading: ergodic is not for algorithm1
 plan.yaml --nonsense | No such option

@@ -12,7 +12,6 @@ from faao_mav.optimizer.pricing import MutualInformation
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
-from faao_mav.schedule import Conversion
 from faao_mav.validate.check import check
 from faao_mav.workflow import Result, plan_mission
 
@@ -29,12 +28,6 @@ def result(small_plan: MakePlan) -> Result:
         seconds_optimize=1.0,
         seconds_total=2.0,
     )
-
-
-@pytest.fixture(scope="module")
-def conversion(result: Result) -> Conversion:
-    assert result.conversion is not None
-    return result.conversion
 
 
 def test_a_prediction_that_no_flight_has_confirmed_says_so(
@@ -85,14 +78,6 @@ def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) 
         assert told["gain_over_cutoff"] == gain
     assert result.as_dict()["rate"] == "cutoff"
     assert result.as_dict()["gain_over_cutoff"] is None
-
-
-def test_a_vehicle_that_keeps_its_parameters_is_told_of_none(
-    result: Result, conversion: Conversion
-) -> None:
-    kept = replace(result, conversion=replace(conversion, parameters={}))
-    assert "parameters" not in summary(kept)
-    assert kept.as_dict()["mission"]["parameters"] == {}
 
 
 def test_a_run_that_did_not_converge_says_so(result: Result) -> None:

@@ -1,11 +1,9 @@
 """The background map of an MBTiles file: which picture is where, and files that are none."""
 
 import sqlite3
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
-import pytest
 from typer.testing import CliRunner
 
 from faao_mav.app.tiles import TileFile
@@ -41,24 +39,20 @@ def test_rows_are_counted_from_the_north(tmp_path: Path) -> None:
     assert (file.background.attribution, file.background.deepest) == ("me &amp; you", 2)
 
 
-@pytest.mark.parametrize(
-    ("write", "told"),
-    [
-        (lambda _: None, "there is no such file"),
-        (lambda path: path.write_bytes(b""), "not an MBTiles file: no such table: metadata"),
-        (lambda path: path.write_bytes(b"x" * 4096), "not an MBTiles file: file is not a database"),
-        (lambda path: mbtiles(path, ()), "there are no tiles in it"),
-        (lambda path: mbtiles(path, (("z", 0, 0, b""),)), "there are no tiles in it"),
-        (lambda path: mbtiles(path, ((0, 0, 0, b""),), ()), "format None; expected one of png"),
-        (lambda path: mbtiles(path, ((0, 0, 0, b""),), (("format", "pbf"),)), "format pbf"),
-    ],
-)
-def test_a_file_that_is_no_map_is_one_clear_error(
-    write: Callable[[Path], object], told: str, tmp_path: Path
-) -> None:
-    write(path := tmp_path / "field.mbtiles")
-    result = CliRunner().invoke(app, ["app", "--no-browser", "--mbtiles", str(path)])
-    assert result.exit_code == 2
-    assert result.stderr.count("\n") == 1
-    assert f"--mbtiles {path}: " in result.stderr
-    assert told in result.stderr
+def test_a_file_that_is_no_map_is_one_clear_error(tmp_path: Path) -> None:
+    path = tmp_path / "field.mbtiles"
+    for write, told in (
+        (lambda: None, "there is no such file"),
+        (lambda: path.write_bytes(b""), "not an MBTiles file: no such table: metadata"),
+        (lambda: path.write_bytes(b"x" * 4096), "not an MBTiles file: file is not a database"),
+        (lambda: mbtiles(path, ()), "there are no tiles in it"),
+        (lambda: mbtiles(path, (("z", 0, 0, b""),)), "there are no tiles in it"),
+        (lambda: mbtiles(path, ((0, 0, 0, b""),), ()), "format None; expected one of png"),
+        (lambda: mbtiles(path, ((0, 0, 0, b""),), (("format", "pbf"),)), "format pbf"),
+    ):
+        path.unlink(missing_ok=True)
+        write()
+        result = CliRunner().invoke(app, ["app", "--no-browser", "--mbtiles", str(path)])
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert f"--mbtiles {path}: " in result.stderr
+        assert told in result.stderr

@@ -40,8 +40,9 @@ def drawn(text: Any) -> Any:
     return text.get_window_extent()
 
 
-def test_axes_are_named_with_units_and_plots_that_share_a_figure_have_titles() -> None:
+def test_axes_are_named_with_units_and_legends_hide_no_curve() -> None:
     for figure in every():
+        figure.draw_without_rendering()
         plots = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
         for axes in set(figure.axes) - set(plots):
             assert axes.get_ylabel() == "planned speed, m/s"
@@ -54,17 +55,9 @@ def test_axes_are_named_with_units_and_plots_that_share_a_figure_have_titles() -
                 for other in plots
             )  # fmt: skip
             assert bool(axes.get_xlabel()) == lowest
-
-
-def test_legends_hide_no_curve() -> None:
-    for figure in every():
-        figure.draw_without_rendering()
-        for axes in figure.axes:
-            if axes.get_legend() is not None:
-                legend = drawn(axes.get_legend())
-                assert legend.y0 >= axes.get_window_extent().y1 - 0.5
-                if axes.get_title("left"):
-                    assert legend.x0 >= drawn(axes._left_title).x1
+            if (legend := axes.get_legend()) is not None:
+                assert drawn(legend).y0 >= axes.get_window_extent().y1 - 0.5
+                assert drawn(legend).x0 >= drawn(axes._left_title).x1 or not axes.get_title("left")
 
 
 def test_the_curves_are_the_flight() -> None:
@@ -76,18 +69,13 @@ def test_the_curves_are_the_flight() -> None:
     np.testing.assert_array_equal(planned.get_ydata(), np.hypot(*solution.v.T))
     assert set(lines(speed)["v_max"].get_ydata()) == {solution.plan.vehicle.max_speed}
     assert set(lines(acceleration)["a_max"].get_ydata()) == {5.0}
+    late = prediction().duration - solution.plan.flight.duration
+    assert late > 1
+    over = lines(speed)["predicted"].get_xdata()[-1]
+    assert over == pytest.approx(solution.t[-1] + late, abs=0.2)  # to its end
     to_uav, to_user = figures.rates(solution, prediction()).axes
     np.testing.assert_array_equal(lines(to_uav)["planned"].get_ydata(), solution.I_U)
     np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), prediction().I_G)
-
-
-def test_a_flight_that_ends_late_is_drawn_to_its_end() -> None:
-    found = flown()
-    speed, _ = figures.motion(found.solution, conversion()).axes
-    late = prediction().duration - found.solution.plan.flight.duration
-    assert late > 1
-    over = lines(speed)["predicted"].get_xdata()[-1]
-    assert over == pytest.approx(found.solution.t[-1] + late, abs=0.2)
 
 
 def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen(small_plan: MakePlan) -> None:
@@ -124,7 +112,8 @@ def test_precoders_for_every_draw_are_averaged(small_plan: MakePlan) -> None:
 
 def test_the_map_has_stations_waypoints_and_fence() -> None:
     found = flown()
-    axes = figures.route_figure(found.solution, conversion()).axes[0]
+    figure = figures.route_figure(found.solution, conversion())
+    axes = figure.axes[0]
     names = {text.get_text() for text in axes.texts}
     items = enumerate(conversion().mission.items, 1)
     numbers = {str(number) for number, item in items if item.command == 16}
@@ -134,15 +123,9 @@ def test_the_map_has_stations_waypoints_and_fence() -> None:
     (east, north), *_ = [np.asarray(line).T for line in drawn if np.size(line) > 40]
     np.testing.assert_allclose(np.ptp(east), 10.0, rtol=1e-3)
     np.testing.assert_allclose(north.mean(), 0.0002 * 110_950, rtol=0.05)  # m per degree
-
-
-def test_a_fence_of_kilometres_leaves_the_route_to_be_seen() -> None:
-    found = flown()
-    figure = figures.route_figure(found.solution, conversion())
+    # a fence of kilometres leaves the route to be seen
     figure.draw_without_rendering()
-    plot = figure.axes[0]
-    assert np.ptp(plot.dataLim.intervalx) < 3 * np.ptp(found.solution.w[:, 0])
-    assert np.ptp(plot.get_xlim()) < 5 * np.ptp(found.solution.w[:, 0])
+    assert np.ptp(axes.get_xlim()) < 5 * np.ptp(found.solution.w[:, 0])
 
 
 def test_what_is_written_on_the_map_stays_apart() -> None:
@@ -164,16 +147,11 @@ def test_what_is_written_on_the_map_stays_apart() -> None:
                 assert edge.contains(*box.max)
 
 
-@pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_files_are_the_same_every_time(tmp_path: Path, suffix: str) -> None:
-    written = []
-    for name in ("a", "b"):
-        path = tmp_path / f"{name}{suffix}"
-        save_figure(figures.convergence(flown().solution), path)
-        written.append(path.read_bytes())
-    assert written[0] == written[1]
-
-
-def test_other_formats_are_refused(tmp_path: Path) -> None:
+def test_files_are_the_same_every_time_and_other_formats_are_refused(tmp_path: Path) -> None:
+    for suffix in (".png", ".svg", ".pdf"):
+        written = [tmp_path / f"{name}{suffix}" for name in "ab"]
+        for path in written:
+            save_figure(figures.convergence(flown().solution), path)
+        assert written[0].read_bytes() == written[1].read_bytes()
     with pytest.raises(InputError, match=r"\.png, \.svg, \.pdf"):
         save_figure(figures.convergence(flown().solution), tmp_path / "f.gif")

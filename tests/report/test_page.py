@@ -8,21 +8,20 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from conftest import FLYABLE, PATIENCE, SMALL
-from reported import HOSTILE, conversion, flown, prediction
+from conftest import FLYABLE, PATIENCE
+from reported import HOSTILE, conversion, flown
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.pricing import FreshRates, MutualInformation, Saturation
-from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
 from faao_mav.report.page import render_report
 from faao_mav.validate.check import Check
 from faao_mav.workflow import Result
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}
-FIGURES = ("Route", "Motion", "Link", "Queue", "Precoders", "Convergence")
+SECTIONS = "Result Findings Parameters Route Motion Link Queue Convergence Precoders Starts Plan"
+FIGURES = 6
 
 
 class Page(HTMLParser):
@@ -61,37 +60,18 @@ def full() -> str:
     return render_report(flown())
 
 
-def test_every_section_is_there(full: str) -> None:
+def test_every_section_is_there_and_every_picture_has_a_title(full: str) -> None:
     page = Page(full)
-    headings = page.of("h2")
-    assert headings == [
-        *(
-            "Result",
-            "Findings",
-            "Parameters",
-            "Route",
-            "Motion",
-            "Link",
-            "Queue",
-            "Convergence",
-            "Precoders",
-        ),
-        *("Starts", "Plan"),
-    ]
+    assert page.of("h2") == SECTIONS.split()
     pictures = [attributes for tag, attributes in page.elements if tag == "svg"]
-    assert len(pictures) == len(FIGURES)
+    assert len(pictures) == FIGURES
     assert all(picture["role"] == "img" for picture in pictures)
     titles = {a["id"] for tag, a in page.elements if tag == "title" and "id" in a}
     assert titles == {picture["aria-labelledby"] for picture in pictures}
-    shown = " ".join(text for _, text in page.texts)
-    assert f"{flown().solution.rates.R_avg:.4f} bit/s/Hz" in shown
-    assert f"{prediction().duration:.1f} s" in shown
-    assert "v_max" in shown
     assert page.of("text").count("predicted") == 5  # map, speed, both rates and the queue
     wanted = conversion().parameters
-    assert wanted
-    cells = page.of("td")
-    assert set(wanted) | {f"{value:g}" for value in wanted.values()} <= set(cells)
+    assert set(wanted) | {f"{value:g}" for value in wanted.values()} <= set(page.of("td"))
+    shown = " ".join(text for _, text in page.texts)
     assert re.search(r"faao-mav \d.*numpy \d.*Python \d", shown)
 
 
@@ -107,28 +87,6 @@ def facts(page: str) -> dict[str, list[str]]:
 
 
 @pytest.mark.usefixtures("unpainted")
-def test_what_the_plan_is_worth_by_other_measures() -> None:
-    solution = flown().solution
-    result = Result(
-        solution=solution,
-        information=MutualInformation(1.9, 1.8, 1.7, 0.004),
-        fresh=FreshRates(1.6, 0.02, 1.5, 0.03),
-        saturation=Saturation(2.0, 3.2),
-        bound=Bound(1.95, exact=False),
-    )
-    told = facts(render_report(result))
-    assert "bit/s/Hz, at most 2 by the alphabet (base station to UAV" in told["rate"][0]
-    assert told["information"] == ["mutual information 1.800 ± 0.004, 1.700 delivered"]
-    assert told["new fading"][0].startswith("1.5000 ± 0.03 bit/s/Hz delivered, R_avg 1.6000 ± 0.02")
-    assert "3.2 dB less power at both stations would do" in told["saturated"][0]
-    assert "1.9500 bit/s/Hz (estimate)" in told["bound"][0]
-    sure = Result(solution, saturation=Saturation(2.0, 0.0), bound=Bound(2.0, True))
-    exact = facts(render_report(sure))
-    assert exact.keys() == {"rate", "delivered", "bound", "starts", "optimiser"}
-    assert exact["bound"][0].endswith("2.0000 bit/s/Hz (estimate)")
-
-
-@pytest.mark.usefixtures("unpainted")
 def test_the_page_says_what_the_summary_says_but_how_long_it_took() -> None:
     page = render_report(flown())
     told = [text for texts in facts(page).values() for text in texts]
@@ -136,21 +94,14 @@ def test_the_page_says_what_the_summary_says_but_how_long_it_took() -> None:
     assert [text for text in told if text not in said] == [
         line for line in told if line.startswith("converged after")
     ]
-    later = replace(flown(), seconds_optimize=99.0, seconds_total=100.0)
-    assert render_report(later) == page
-
-
-@pytest.mark.usefixtures("unpainted")
-def test_a_flight_without_a_mission_says_why() -> None:
-    none = render_report(Result(flown().solution, no_mission=InfeasibleError("too many items")))
-    assert facts(none)["mission"] == ["none: too many items"]
-    assert "Findings" not in Page(none).of("h2")
+    assert render_report(replace(flown(), seconds_optimize=99.0, seconds_total=100.0)) == page
 
 
 def test_a_part_that_is_not_there_leaves_its_sections_out() -> None:
-    alone = Page(render_report(Result(flown().solution)))
-    assert "Findings" not in alone.of("h2")
-    assert "predicted" not in " ".join(alone.of("text"))
+    none = render_report(Result(flown().solution, no_mission=InfeasibleError("too many items")))
+    assert facts(none)["mission"] == ["none: too many items"]
+    assert "Findings" not in Page(none).of("h2")
+    assert "predicted" not in " ".join(Page(none).of("text"))
     sound = Check(conversion().mission, conversion().vehicle, unpredicted="no model")
     checked = Page(render_report(sound, title="Checked"))
     assert checked.of("h2") == ["Result", "Findings"]
@@ -160,50 +111,30 @@ def test_a_part_that_is_not_there_leaves_its_sections_out() -> None:
     assert Page(untitled).of("h1") == ["Relay flight"]
 
 
-def test_nothing_comes_from_elsewhere(full: str) -> None:
+def test_nothing_comes_from_elsewhere_and_names_are_text(full: str) -> None:
     page = Page(full)
-    assert {tag for tag, _ in page.elements} & {
-        "script",
-        "link",
-        "img",
-        "iframe",
-        "object",
-    } == set()
+    loading = {"script", "link", "img", "iframe", "object"}
+    assert not loading & {tag for tag, _ in page.elements}
     for tag, attributes in page.elements:
         for name, value in attributes.items():
             assert not name.startswith("on"), (tag, name)
             if name in ("href", "src", "xlink:href"):
                 assert (value or "").startswith("#"), (tag, value)
-    assert "http:" not in full
-    assert "https:" not in full
-    assert "@import" not in full
-    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", full))
-
-
-def test_what_is_referred_to_is_in_the_page_once(full: str) -> None:
-    page = Page(full)
-    names = [a["id"] for _, a in page.elements if a.get("id")]
-    assert len(names) == len(set(names))
-    used = re.findall(r"url\(#([^)]*)\)", full) + re.findall(r'href="#([^"]*)"', full)
-    assert set(used) <= set(names)
-    assert used
-
-
-def test_names_and_messages_are_text(full: str) -> None:
-    page = Page(full)
-    assert page.of("h1") == [HOSTILE]
-    assert page.of("title")[0] == HOSTILE
-    assert "<script" not in full
+    assert not any(word in full for word in ("http:", "https:", "@import", "<script"))
+    ids = [a["id"] for _, a in page.elements if a.get("id")]
+    assert len(ids) == len(set(ids))
+    targets = re.findall(r"url\(([^)]*)\)", full) + re.findall(r'href="([^"]*)"', full)
+    assert targets
+    assert {target[0] for target in targets} == {"#"}
+    assert {target[1:] for target in targets} <= set(ids)
+    assert page.of("h1") == [HOSTILE] == page.of("title")[:1]
     assert "item 4: the leg is <b>outside</b> [fence-leg]" in "".join(page.of("li"))
     assert page.of("b") == ["error", "note"]
     assert "".join(page.of("pre")) == flown().solution.plan.text
 
 
-def test_the_same_flight_gives_the_same_page(full: str) -> None:
+def test_the_same_flight_gives_the_same_page_in_light_and_dark(full: str) -> None:
     assert render_report(flown()) == full
-
-
-def test_dark_paper_has_every_colour_of_the_light(full: str) -> None:
     light, dark = (
         set(re.findall(r"(--\w+):", block))
         for block in re.findall(r":root \{(.*?)\}", full, re.DOTALL)
@@ -219,21 +150,9 @@ def test_the_main_job_writes_page_and_figure(tmp_path: Path) -> None:
     arguments = [word for option, name in options for word in (option, str(tmp_path / name))]
     result = CliRunner().invoke(app, [str(tmp_path / "plan.yaml"), *arguments])
     assert result.exit_code == 0, result.output
-    page = Page((tmp_path / "r.html").read_text())
-    assert "Findings" in page.of("h2")
+    assert "Findings" in Page((tmp_path / "r.html").read_text()).of("h2")
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
     assert all(str(tmp_path / name) in result.stdout for name in names)
-
-
-@pytest.mark.parametrize(("option", "name"), [("--report", "r.pdf"), ("--figure", "f.jpg")])
-def test_other_formats_are_refused_before_the_work(tmp_path: Path, option: str, name: str) -> None:
-    (tmp_path / "plan.yaml").write_text(SMALL)
-    out = tmp_path / "m.waypoints"
-    arguments = [str(tmp_path / "plan.yaml"), "--out", str(out), option, str(tmp_path / name)]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 2
-    assert f"{option} {tmp_path / name}: give a name that ends in" in result.stderr
-    assert not out.exists()
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium to show the page with")
