@@ -89,24 +89,15 @@ def serve(
         lifespan="on",
         timeout_graceful_shutdown=_GRACE,
     )
-
-    class Server(uvicorn.Server):
-        """Says where it is once it listens there."""
-
-        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-            await super().startup(sockets)
-            address = f"http://{here}:{port}/?token={token}"
-            note(f"the page is at {address}")
-            if browser:
-                opening.enter_context(_opened(address))
-
-    with contextlib.ExitStack() as opening:
-        try:
-            asyncio.run(Server(config).serve(sockets=[listening]))
-        except KeyboardInterrupt:
-            note("ended")
-        finally:
-            workers.stop()
+    address = f"http://{here}:{port}/?token={token}"
+    note(f"the page is at {address}")
+    try:
+        with _opened(address) if browser else contextlib.nullcontext():
+            asyncio.run(uvicorn.Server(config).serve(sockets=[listening]))
+    except KeyboardInterrupt:
+        note("ended")
+    finally:
+        workers.stop()
 
 
 def _bound(host: str, port: int) -> socket.socket:
@@ -115,6 +106,7 @@ def _bound(host: str, port: int) -> socket.socket:
         listening = socket.socket(family, kind)
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
+        listening.listen()  # who comes before the server has begun waits for it
     except OSError as error:
         raise InputError(f"--host {host} --port {port}: {error.strerror or error}") from None
     return listening

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Collection, Iterator, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,9 +35,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_Outline: TypeAlias = tuple[Real, bool]
-"""Corners (k, 2), m, closed, and whether the aircraft has to stay inside."""
-
 _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on its map."""
 
@@ -46,7 +43,7 @@ _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
 _SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
 
 _BESIDE = 9.0  # points from a waypoint to the middle of its number; chosen: clear of a route's line
-_APART = 0.045  # least distance of two waypoints with numbers, of what is shown; chosen to be read
+_APART = 0.05  # least distance of two items with numbers, of how far all reach; chosen to be read
 
 
 def route_map(
@@ -60,32 +57,29 @@ def route_map(
 
     It shows all of the flight and both stations, and of a wider fence what is near them.
     """
-    radio, origin = solution.plan.radio, solution.plan.origin
-    stations = np.array([radio.base_station.position, radio.ground_user.position])
-    marked = zip(("base station", "user"), stations.tolist(), "s^", strict=True)
-    frame = LocalFrame(origin.latitude, origin.longitude)
-    fence = conversion.mission.fence if conversion is not None else solution.plan.geofence
-    outlines = _outlines_of(fence, frame)
-    lines, places = [solution.w], np.empty((0, 2))
-    numbers: list[int] = []
-    if conversion is not None:
-        numbers, places = _places_of(conversion.mission, frame, _WAYPOINTS)
-        lines.append(conversion.schedule.track()["predicted_w"])
-        lines += _ways(solution.plan, conversion) if outlines else ()
-    real = [flown.w] if flown is not None else []
-    _draw_fence(plot, outlines)
-    _draw_margin(plot, solution.plan)
+    plan, radio = solution.plan, solution.plan.radio
+    stations = [radio.base_station.position, radio.ground_user.position]
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    fence = plan.geofence if conversion is None else conversion.mission.fence
+    outlines = _draw_fence(plot, fence, frame)
+    if plan.keep_in is not None and plan.fence is not None:
+        for edge in plan.keep_in.inside(plan.fence.margin).edges():
+            name = f"margin {plan.fence.margin:g} m"
+            plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
     _coloured(plot, solution)
-    for path in real:
-        plot.plot(*path.T, color=SERIES[1], linewidth=1.6, label="flown")
+    seen = [solution.w, np.array(stations)]
+    if flown is not None:
+        seen.append(flown.w)
+        plot.plot(*flown.w.T, color=SERIES[1], linewidth=1.6, label="flown")
     if conversion is not None:
-        plot.plot(*lines[1].T, "--", color=INK, linewidth=0.9, label="predicted")
-        for way, name in zip(lines[2:], ("from and to home", None), strict=False):
-            plot.plot(*way.T, color=MUTED, linewidth=0.9, label=name)
-        _draw_waypoints(plot, places, "waypoint")
-    _show_all(plot, np.concatenate([*lines, *real, stations, places]), outlines, title)
-    _write_numbers(plot, numbers, places)
-    mark_stations(plot, list(marked))  # their names above the numbers
+        seen.append(conversion.schedule.track()["predicted_w"])
+        plot.plot(*seen[-1].T, "--", color=INK, linewidth=0.9, label="predicted")
+        for way in _ways(plan, conversion) if outlines else ():
+            seen.append(way)
+            plot.plot(*way.T, color=MUTED, linewidth=0.9, label="from and to home")
+        seen.append(_draw_items(plot, conversion.mission, frame, _WAYPOINTS, "waypoint"))
+    _show_all(plot, np.concatenate(seen), outlines, title)
+    mark_stations(plot, list(zip(("base station", "user"), stations, "s^", strict=True)))
 
 
 def mission_map(mission: Mission, track: Track) -> "Figure":
@@ -94,46 +88,27 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
     East and north in metres about the origin of the track's frame; items count from 1.
     """
     flown = track.position[:, :2]
-    numbers, places = _places_of(mission, track.frame, FLOWN_TO)
     with drawing(WIDTH, 4.2) as figure:
         plot = figure.subplots()
-        outlines = _outlines_of(mission.fence, track.frame)
-        _draw_fence(plot, outlines)
+        outlines = _draw_fence(plot, mission.fence, track.frame)
         plot.plot(*flown.T, color=SERIES[0], label="predicted")
-        _draw_waypoints(plot, places, "item")
+        places = _draw_items(plot, mission, track.frame, FLOWN_TO, "item")
         _show_all(plot, np.concatenate([flown, places]), outlines)
-        _write_numbers(plot, numbers, places)
     return figure
 
 
-def _places_of(
-    mission: Mission, frame: LocalFrame, commands: Collection[int]
-) -> tuple[list[int], Real]:
-    """Return numbers, from 1, and places (k, 2), m, of the items with one of `commands`."""
-    found = [
-        (number, item.x, item.y)
-        for number, item in enumerate(mission.items, 1)
-        if item.command in commands and (item.x or item.y)
-    ]
-    numbers, latitudes, longitudes = zip(*found, strict=True) if found else ((), (), ())
-    return list(numbers), frame.to_local(latitudes, longitudes)
-
-
-def _draw_waypoints(plot: "Axes", places: Real, name: str) -> None:
-    """Draw dots at `places` (k, 2), m, and a legend for all that is drawn."""
-    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
-    legend_above(plot, 2)
-
-
-def _draw_fence(plot: "Axes", outlines: Sequence[_Outline]) -> None:
-    """Draw the fence: dashed where the aircraft has to stay inside, filled where outside."""
-    names = {True: "stay inside", False: "stay out"}
-    for corners, inside in outlines:
-        colour, style = (MUTED, "--") if inside else (SERIES[5], "-")
-        name = names.pop(inside, None)  # once in the legend
-        plot.plot(*corners.T, style, color=colour, linewidth=1.2, label=name)
-        if not inside:
-            plot.fill(*corners.T, color=colour, alpha=0.15, linewidth=0)
+def _draw_fence(plot: "Axes", fence: Fence, frame: LocalFrame) -> list[Real]:
+    """Draw and return the outlines (k, 2), m: dashed to stay inside of, filled to stay out of."""
+    outlines = []
+    for area in areas_of(fence, frame):
+        colour, style = (MUTED, "--") if area.inclusion else (SERIES[5], "-")
+        name = "stay inside" if area.inclusion else "stay out"
+        for ring in area.rings():
+            outlines.append(ring)
+            plot.plot(*ring.T, style, color=colour, linewidth=1.2, label=name)
+            if not area.inclusion:
+                plot.fill(*ring.T, color=colour, alpha=0.15, linewidth=0)
+    return outlines
 
 
 def _ways(plan: Plan, conversion: Conversion) -> Iterator[Real]:
@@ -144,18 +119,7 @@ def _ways(plan: Plan, conversion: Conversion) -> Iterator[Real]:
         yield np.vstack([route[-1:], way_home(plan, route[-1]), home])
 
 
-def _draw_margin(plot: "Axes", plan: Plan) -> None:
-    """Draw how far the plan keeps from the fence's edge: dotted, with its name in the legend."""
-    area, fence = plan.keep_in, plan.fence
-    if area is None or fence is None:
-        return
-    name: str | None = f"margin {fence.margin:g} m"
-    for edge in area.inside(fence.margin).edges():
-        plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
-        name = None  # once in the legend
-
-
-def _show_all(plot: "Axes", seen: Real, outlines: Sequence[_Outline], title: str = "") -> None:
+def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real], title: str = "") -> None:
     """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it.
 
     A metre is as long to the east as to the north.
@@ -163,13 +127,13 @@ def _show_all(plot: "Axes", seen: Real, outlines: Sequence[_Outline], title: str
     low, high = seen.min(axis=0), seen.max(axis=0)
     width = float((high - low).max()) or 1.0
     if outlines:
-        corners = np.concatenate([corners for corners, _ in outlines])
-        corners = np.clip(corners, low - width / 2, high + width / 2)
+        corners = np.clip(np.concatenate(outlines), low - width / 2, high + width / 2)
         low, high = np.minimum(low, corners.min(axis=0)), np.maximum(high, corners.max(axis=0))
     plot.set_aspect("equal", adjustable="datalim")
     plot.dataLim.set_points(np.array([low, high]))
     plot.margins(0.08)
     label(plot, title, "east, m", "north, m")
+    legend_above(plot, 2)
 
 
 def _coloured(plot: "Axes", solution: Solution) -> None:
@@ -178,13 +142,14 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap
 
-    step = max(1, -(-(len(solution.w) - 1) // _PIECES))
-    ends = np.unique(np.append(np.arange(0, len(solution.w), step), len(solution.w) - 1))
-    pieces = [solution.w[a : b + 1] for a, b in itertools.pairwise(ends)]
+    count = len(solution.w)
+    ends = np.linspace(0, count - 1, min(count, _PIECES + 1)).round().astype(int)
+    pieces = [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
     speeds = lengths(solution.v)
-    means = np.array([speeds[a : b + 1].mean() for a, b in itertools.pairwise(ends)])
+    means = np.array([speeds[piece].mean() for piece in pieces])
     colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
-    lines = LineCollection(pieces, cmap=colours, linewidths=5, capstyle="round")
+    route = [solution.w[piece] for piece in pieces]
+    lines = LineCollection(route, cmap=colours, linewidths=5, capstyle="round")
     lines.set_array(means)
     lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
     plot.add_collection(lines)
@@ -195,22 +160,27 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
         bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
 
 
-def _outlines_of(fence: Fence, frame: LocalFrame) -> list[_Outline]:
-    """Return the areas of `fence` in metres about `frame`'s origin."""
-    areas = areas_of(fence, frame)
-    return [(ring, area.inclusion) for area in areas for ring in area.rings()]
-
-
-def _write_numbers(plot: "Axes", numbers: Sequence[int], places: Real) -> None:
-    """Write `numbers` beside their `places` (k, 2), m, on a map of which the limits are known.
+def _draw_items(
+    plot: "Axes", mission: Mission, frame: LocalFrame, commands: Collection[int], name: str
+) -> Real:
+    """Draw the items with one of `commands`, numbered from 1; return their places (k, 2), m.
 
     A number stands right of the way. Where one is near already, it is left out.
     """
-    least = _APART * np.ptp(plot.dataLim.get_points(), axis=0).max()
+    found = [
+        (number, item.x, item.y)
+        for number, item in enumerate(mission.items, 1)
+        if item.command in commands and (item.x or item.y)
+    ]
+    numbers, latitudes, longitudes = zip(*found, strict=True) if found else ((), (), ())
+    places = frame.to_local(latitudes, longitudes)
+    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
     ways = np.gradient(places, axis=0) if len(places) > 1 else np.ones_like(places)
+    least = _APART * np.ptp(places, axis=0).max() if numbers else 0.0
     written = np.empty((0, 2))
     for number, place, (east, north) in zip(numbers, places, ways, strict=True):
         if not (lengths(written - place) < least).any():
             written = np.vstack([written, place])
             side = _BESIDE * np.array([north, -east]) / (float(np.hypot(east, north)) or 1.0)
             write_beside(plot, str(number), place, side, fontsize=8, ha="center", va="center")
+    return places

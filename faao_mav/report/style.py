@@ -97,7 +97,11 @@ def label(axes: "Axes", title: str, x: str, y: str) -> None:
 
 def legend_above(axes: "Axes", columns: int = 3) -> None:
     """Put the legend over the plot, right of its title, where it hides no curve."""
+    handles, names = axes.get_legend_handles_labels()
+    once = dict(zip(names, handles, strict=True))
     axes.legend(
+        once.values(),
+        once.keys(),
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
         borderaxespad=0.0,
