@@ -200,11 +200,11 @@ def test_an_empty_part_is_named_and_passed_over() -> None:
     ("value", "told"),
     [
         ({"type": "Feature", "geometry": {"type": "Curve"}}, "geometry.type: 'Curve'"),
-        ({"type": "Polygon", "coordinates": 5}, "coordinates: 5; expected a list"),
+        ({"type": "Polygon", "coordinates": 5}, "the polygon: expected lists of corners"),
         (feature("Polygon", [[[47.0, 500.0], *SQUARE]], {"name": "NFZ"}), "fence polygon: 500.0"),
-        (feature("Polygon", [[[47.0, "8.0"], *SQUARE]], {}), r"coordinates\[0\]\[0\]\[1\]: '8.0'"),
+        (feature("Polygon", [[[47.0, "x"], *SQUARE]], {}), r"geometry: .47.0, 'x'.; expected lo"),
         (feature("Polygon", [[[1, 2], [3, 4]]], {"name": "field"}), "2 vertices; expected at"),
-        ({"type": "Polygon", "coordinates": [["a"]]}, "expected .longitude, latitude."),
+        ({"type": "Polygon", "coordinates": [["a"]]}, "expected longitude, latitude in"),
         (feature("Polygon", [SQUARE], {"inclusion": "perhaps"}), "expected true or false"),
         (feature("Polygon", [SQUARE, HOLE], {"inclusion": False}), "an exclusion with a hole"),
         (
@@ -234,7 +234,7 @@ def test_what_is_no_fence_is_refused_with_its_place(value: Any, told: str) -> No
             "an exclusion with a hole",
         ),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><kml>&b;</kml>", "document type or entities"),
-        (KML.replace("8.1,47,0", "8.1;47"), "polygon 'field': '8.1;47'"),
+        (KML.replace("8.1,47,0", "8.1;47"), r"polygon 'field': .'8.1;47'.; expected longi"),
         (KML.replace("8.1,47,0", "800,47,0"), "polygon 'field': fence polygon: 47.0, 800.0"),
         (KML.replace("8.1,47,0", "nan,47,0"), "polygon 'field'"),
         ("<kml>" + "<a><name>b</name>" * 60 + "</a>" * 60 + "</kml>", "nested more than 50 deep"),

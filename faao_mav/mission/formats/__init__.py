@@ -39,12 +39,14 @@ class Format:
     fence_beside: bool = False
 
 
-_WPL = Format(read_wpl, lambda mission, _, __: write_wpl(mission), wpl_losses, fence_beside=True)
+_WPL = Format(read_wpl, lambda mission, *_: write_wpl(mission), lambda m, _: wpl_losses(m), True)
 _FORMATS = {
     ".waypoints": _WPL,
     ".txt": _WPL,
     ".plan": Format(read_qgc_plan, lambda mission, to, _: write_qgc_plan(mission, to), plan_losses),
-    ".kml": Format(None, lambda mission, _, name: write_kml(mission, name), kml_losses),
+    ".kml": Format(
+        None, lambda mission, _, name: write_kml(mission, name), lambda m, _: kml_losses(m)
+    ),
 }
 
 MAX_BYTES = 16_000_000
@@ -60,7 +62,11 @@ class Rendered:
 
 
 def read_mission(path: str | Path) -> Mission:
-    """Return the mission in the file `path`: `read_mission_file` without what is said beside it."""
+    """Return the mission in the file `path`, with the fence beside it.
+
+    The file's format is told by the ending of its name. Raises `MissionFileError` as
+    `read_mission_file`.
+    """
     return read_mission_file(path).mission
 
 

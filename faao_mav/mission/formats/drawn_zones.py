@@ -7,6 +7,7 @@ error that says how to tell.
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import shapely
 
@@ -50,37 +51,55 @@ Ring = list[LatLon]
 class DrawnZone:
     """A zone of a drawing: its polygons, each an outline and holes, and what is said of it.
 
-    `place` is where it stands in the file, for messages; `properties` are its own, `around` the
-    names of what it is in.
+    A corner is longitude, latitude and what else a drawing has, as numbers or texts. `place` is
+    where the zone stands in the file, for messages; `properties` are its own, `around` the names of
+    what it is in.
     """
 
     place: str
     name: str
     properties: Mapping[str, object]
     around: Sequence[str]
-    parts: Sequence[Sequence[Ring]]
+    parts: Sequence[Sequence[Sequence[Sequence[object]]]]
 
 
 def fence_of(zones: Iterable[DrawnZone]) -> Fence:
     """Return the fence of `zones`; holes of an inclusion are exclusions.
 
     The parts of an inclusion are one area, which autopilots would intersect: they are joined. The
-    fence's notes name the polygons without corners, passed over. Raises `MissionFileError` for a
-    zone of which nothing tells whether to stay in or out, and for an exclusion with a hole, which
-    no autopilot has; `InputError` as `Fence` does.
+    fence's notes name the polygons without corners, passed over. Raises `MissionFileError` for what
+    is no corner, for a zone of which nothing tells whether to stay in or out, and for an exclusion
+    with a hole, which no autopilot has; `InputError` as `Fence` does.
     """
     polygons: list[Polygon] = []
     notes = []
     for zone in zones:
-        parts = [[_open(ring) for ring in part] for part in zone.parts if part and part[0]]
-        if len(parts) < len(zone.parts):
-            name = f" {quote(zone.name)}" if zone.name else ""
-            notes.append(f"{zone.place}{name}: a polygon without corners, passed over")
         try:
-            polygons += _polygons(zone, parts) if parts else []
+            parts = [[_ring(ring) for ring in part] for part in zone.parts]
+            drawn = [part for part in parts if part and part[0]]
+            polygons += _polygons(zone, drawn) if drawn else []
         except InputError as error:
             raise MissionFileError(f"{zone.place}: {error}") from None
+        except TypeError:  # of what is no list
+            raise MissionFileError(f"{zone.place}: expected lists of corners") from None
+        if len(drawn) < len(parts):
+            name = f" {quote(zone.name)}" if zone.name else ""
+            notes.append(f"{zone.place}{name}: a polygon without corners, passed over")
     return Fence(tuple(polygons), notes=tuple(notes))
+
+
+def _ring(told: Sequence[Sequence[object]]) -> Ring:
+    """Return the corners of a ring, without the last one where that is the first again."""
+    ring = [_corner(each) for each in told]
+    return ring[:-1] if ring[:1] == ring[-1:] else ring
+
+
+def _corner(told: Any) -> LatLon:
+    try:
+        longitude, latitude = map(float, told[:2])
+    except (TypeError, ValueError, KeyError, OverflowError):
+        raise MissionFileError(f"{quote(told)}; expected longitude, latitude in degrees") from None
+    return latitude, longitude
 
 
 def _polygons(zone: DrawnZone, parts: list[list[Ring]]) -> Iterator[Polygon]:
@@ -142,11 +161,6 @@ def _folded(text: str) -> str:
     return " ".join(re.findall(r"[^\W_]+", parted.casefold()))
 
 
-def _open(ring: Ring) -> Ring:
-    """Return the corners of a ring without the last one where that is the first again."""
-    return ring[:-1] if ring[:1] == ring[-1:] else ring
-
-
 def _joined(parts: list[list[Ring]]) -> list[list[Ring]]:
     """Return the union of `parts`, each an outline and its holes, also across the date line."""
     if len(parts) == 1:
@@ -159,13 +173,9 @@ def _joined(parts: list[list[Ring]]) -> list[list[Ring]]:
         shapes.append(shapely.Polygon(rings[0], rings[1:]))
         if not shapely.is_valid(shapes[-1]):
             raise MissionFileError("a part crosses or touches itself; put its corners in order")
-    union = shapely.get_parts(shapely.union_all(shapes))
     return [
-        [
-            [(north, _turn(east)) for north, east in ring.coords[:-1]]
-            for ring in shapely.get_rings(each)
-        ]
-        for each in union
+        [[(n, _turn(e)) for n, e in ring.coords[:-1]] for ring in shapely.get_rings(each)]
+        for each in shapely.get_parts(shapely.union_all(shapes))
     ]
 
 

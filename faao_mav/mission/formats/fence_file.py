@@ -14,9 +14,9 @@ from xml.parsers import expat
 
 from faao_mav.errors import MissionFileError, quote, shortened
 from faao_mav.files import read_bytes, read_text
-from faao_mav.mission.fence import MAX_CORNERS, Fence, LatLon
+from faao_mav.mission.fence import Fence
 from faao_mav.mission.formats import naming, read_mission
-from faao_mav.mission.formats.drawn_zones import DrawnZone, Ring, fence_of
+from faao_mav.mission.formats.drawn_zones import DrawnZone, fence_of
 from faao_mav.mission.formats.json_value import Json
 
 MAX_BYTES = 4_000_000
@@ -60,7 +60,7 @@ def geojson_zones(text: str) -> Iterator[DrawnZone]:
 
     The polygons of a MultiPolygon are one zone. Raises `MissionFileError` that names key and value.
     """
-    ahead: list[tuple[Json, dict[str, Any], tuple[str, ...]]] = [(Json.parsed(text), {}, ())]
+    ahead = [(Json.parsed(text), dict[str, Any](), tuple[str, ...]())]
     while ahead:
         value, properties, around = ahead.pop()
         match value["type"].value:
@@ -76,27 +76,16 @@ def geojson_zones(text: str) -> Iterator[DrawnZone]:
                 inner = reversed(value["geometries"].each())
                 ahead += [(each, properties, around) for each in inner]
             case "Polygon" | "MultiPolygon" as kind:
-                coordinates = value["coordinates"]
-                parts = coordinates.each() if kind == "MultiPolygon" else [coordinates]
-                rings = [
-                    [[_position(p) for p in ring.each(MAX_CORNERS + 1)] for ring in part.each()]
-                    for part in parts
-                ]
+                coordinates = value["coordinates"].value
                 folded = {key.casefold(): told for key, told in properties.items()}
                 named = (folded[key] for key in _NAMES if folded.get(key) not in (None, ""))
-                place = value.place or "the polygon"
-                yield DrawnZone(place, str(next(named, "")), properties, around, rings)
+                place, name = value.place or "the polygon", str(next(named, ""))
+                parts = coordinates if kind == "MultiPolygon" else [coordinates]
+                yield DrawnZone(place, name, properties, around, parts)
             case "Point" | "MultiPoint" | "LineString" | "MultiLineString":
                 continue
             case _:
                 raise value["type"].wrong("a type of GeoJSON, as FeatureCollection")
-
-
-def _position(place: Json) -> LatLon:
-    if not isinstance(place.value, list) or len(place.value) not in (2, 3):
-        raise place.wrong("[longitude, latitude] in degrees")
-    longitude, latitude, *_ = place.numbers(len(place.value))
-    return latitude, longitude
 
 
 def kml_zones(content: bytes) -> Iterator[DrawnZone]:
@@ -166,23 +155,13 @@ def _tree(content: bytes) -> Xml.Element:
     return builder.close()
 
 
-def _rings(polygon: Xml.Element, place: str) -> list[Ring]:
+def _rings(polygon: Xml.Element, place: str) -> list[list[list[str]]]:
     """Return the outline of a polygon and its holes; none for a polygon without an outline."""
     outlines = polygon.findall("outerBoundaryIs/LinearRing")
     if len(outlines) > 1:
         raise MissionFileError(f"{place}: expected one outerBoundaryIs")
     rings = [*outlines, *polygon.findall("innerBoundaryIs/LinearRing")] if outlines else []
-    return [[_corner(each, place) for each in _text(r, "coordinates").split()] for r in rings]
-
-
-def _corner(told: str, place: str) -> LatLon:
-    try:
-        longitude, latitude = map(float, told.split(",")[:2])
-    except ValueError:
-        raise MissionFileError(
-            f"{place}: {quote(told)}; expected longitude,latitude in degrees"
-        ) from None
-    return latitude, longitude
+    return [[each.split(",") for each in _text(ring, "coordinates").split()] for ring in rings]
 
 
 def _text(element: Xml.Element, tag: str) -> str:

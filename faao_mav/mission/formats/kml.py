@@ -8,41 +8,34 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import TypeAlias
-from xml.etree import ElementTree as Xml
+from xml.sax.saxutils import escape
 
+import numpy as np
 import shapely
 
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import (
-    ABOVE_HOME,
-    ABOVE_SEA,
-    ABOVE_TERRAIN,
-    FLOWN_TO,
-    Command,
-    Frame,
-)
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Command, Frame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import areas_of
-from faao_mav.mission.formats.mission_file import PlanTarget, not_read, rally_left_out
+from faao_mav.mission.formats.mission_file import not_read, rally_left_out
 from faao_mav.mission.item import Mission, MissionItem
 
 Spot: TypeAlias = tuple[float, float, float]
 """Latitude and longitude, degrees, and altitude, metres."""
 
-_NAMESPACES = {
-    "xmlns": "http://www.opengis.net/kml/2.2",
-    "xmlns:gx": "http://www.google.com/kml/ext/2.2",
-}
-_STYLES = (
-    ("route", "ff00a5ff", "00ffffff"),
-    ("inclusion", "ffffffff", "00ffffff"),
-    ("exclusion", "ff3232dc", "403232dc"),
+_HEAD = """<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">"""
+_STYLES = "\n".join(
+    f'<Style id="{name}"><LineStyle><color>{line}</color><width>3</width></LineStyle>'
+    f"<PolyStyle><color>{filling}</color></PolyStyle></Style>"
+    for name, line, filling in (
+        ("route", "ff00a5ff", "00ffffff"),
+        ("inclusion", "ffffffff", "00ffffff"),
+        ("exclusion", "ff3232dc", "403232dc"),
+    )
 )
 """Styles by name: opacity, blue, green and red of the lines and of what fills areas; chosen: orange
 shows on fields, towns and water, and so do a white edge and a red one."""
-
-_LINE_WIDTH = "3"
-"""Width of lines in pixels; chosen by eye."""
 
 _ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
@@ -63,35 +56,31 @@ def write_kml(
     `flight` moves along Google Earth's time slider.
     """
     waypoints = list(_waypoints(mission))
-    frames = {item.frame for _, item, _ in waypoints}
     known = ABOVE_SEA if _ground(mission) is None else ABOVE_SEA | ABOVE_HOME
-    mode = "absolute" if frames <= known else "relativeToGround"
-    spots = [spot for _, _, spot in waypoints]
-    parts = [_tag("name", name), *(_style(*each) for each in _STYLES)]
-    if len(spots) > 1:
-        parts.append(_placemark("Route", _shape("LineString", mode, spots), "route"))
-    if spots:
-        points = (
-            _placemark(str(number), _shape("Point", mode, [spot]), told=_description(item))
-            for number, item, spot in waypoints
-        )
-        parts.append(_tag("Folder", _tag("name", "Waypoints"), *points))
-    if mission.fence:
-        parts.append(_tag("Folder", _tag("name", "Fence"), *_areas(mission.fence)))
+    above_sea = {item.frame for _, item, _ in waypoints} <= known
+    mode = "absolute" if above_sea else "relativeToGround"
+    parts = [_tag("name", _text(name)), _STYLES]
+    if len(waypoints) > 1:
+        spots = (spot for _, _, spot in waypoints)
+        parts.append(_placemark("Route", _shape("LineString", mode, *spots), "route"))
+    points = (
+        _placemark(str(number), _tag("description", _description(item)) + _shape("Point", mode, at))
+        for number, item, at in waypoints
+    )
+    for folder, inside in (
+        ("Waypoints", "".join(points)),
+        ("Fence", "".join(_areas(mission.fence))),
+    ):
+        parts += [_tag("Folder", _tag("name", folder) + inside)] if inside else []
     for station, spot in (stations or {}).items():
-        parts.append(_placemark(station, _shape("Point", "absolute", [spot])))
+        parts.append(_placemark(station, _shape("Point", "absolute", spot)))
     if flight:
         parts.append(_placemark("Flight", _track(flight), "route"))
-    root = Xml.Element("kml", _NAMESPACES)
-    root.append(_tag("Document", *parts))
-    Xml.indent(root)
-    body = Xml.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
+    return "\n".join((_HEAD, _tag("Document", "\n".join(parts)), "</kml>", ""))
 
 
-def kml_losses(mission: Mission, target: PlanTarget | None = None) -> Iterator[str]:
-    """Yield what of `mission` a KML file does not hold or show, whomever it is for."""
-    del target
+def kml_losses(mission: Mission) -> Iterator[str]:
+    """Yield what of `mission` a KML file does not hold or show."""
     yield from not_read(mission)
     yield from rally_left_out(mission, "KML")
     yield "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back"
@@ -130,61 +119,50 @@ def _description(item: MissionItem) -> str:
     return f"{name}, hold {hold:g} s" if held else name
 
 
-def _areas(fence: Fence) -> Iterator[Xml.Element]:
+def _areas(fence: Fence) -> Iterator[str]:
     """Yield the areas of `fence`, on the ground, each with its kind in its name; circles too."""
+    if not fence:
+        return
     frame = LocalFrame(*fence.place)
     for area in areas_of(fence, frame):
         for part in shapely.get_parts(area.shape):
-            rings: list[Xml.Element] = []
+            rings = ""
             for ring in shapely.get_rings(part):
-                latitudes, longitudes = frame.to_geodetic(shapely.get_coordinates(ring))
-                places = zip(latitudes.tolist(), longitudes.tolist(), strict=True)
-                text = " ".join(_coordinates((*place, 0.0)) for place in places)
+                places = np.transpose(frame.to_geodetic(shapely.get_coordinates(ring)))
+                drawn = _coordinates(*((north, east, 0.0) for north, east in places.tolist()))
                 boundary = "innerBoundaryIs" if rings else "outerBoundaryIs"
-                rings.append(_tag(boundary, _tag("LinearRing", _tag("coordinates", text))))
-            polygon = _tag("Polygon", _tag("tessellate", "1"), *rings)
+                rings += _tag(boundary, _tag("LinearRing", _tag("coordinates", drawn)))
+            polygon = _tag("Polygon", _tag("tessellate", "1") + rings)
             yield _placemark(area.name, polygon, "inclusion" if area.inclusion else "exclusion")
 
 
-def _track(flight: Sequence[tuple[datetime, Spot]]) -> Xml.Element:
+def _track(flight: Sequence[tuple[datetime, Spot]]) -> str:
     moments = (moment.astimezone(UTC).isoformat(timespec="milliseconds") for moment, _ in flight)
-    whens = [_tag("when", moment.replace("+00:00", "Z")) for moment in moments]
-    coords = [_tag("gx:coord", _coordinates(spot, " ")) for _, spot in flight]
-    return _tag("gx:Track", _tag("altitudeMode", "absolute"), *whens, *coords)
+    whens = "".join(_tag("when", moment.replace("+00:00", "Z")) for moment in moments)
+    spots = "".join(_tag("gx:coord", _coordinates(spot).replace(",", " ")) for _, spot in flight)
+    return _tag("gx:Track", _tag("altitudeMode", "absolute") + whens + spots)
 
 
-def _style(name: str, line: str, filling: str) -> Xml.Element:
-    lines = _tag("LineStyle", _tag("color", line), _tag("width", _LINE_WIDTH))
-    style = _tag("Style", lines, _tag("PolyStyle", _tag("color", filling)))
-    style.set("id", name)
-    return style
+def _placemark(name: str, shape: str, style: str = "") -> str:
+    styled = _tag("styleUrl", f"#{style}") if style else ""
+    return _tag("Placemark", _tag("name", _text(name)) + styled + shape)
 
 
-def _placemark(name: str, shape: Xml.Element, style: str = "", told: str = "") -> Xml.Element:
-    described = [_tag("description", told)] if told else []
-    styled = [_tag("styleUrl", f"#{style}")] if style else []
-    return _tag("Placemark", _tag("name", name), *described, *styled, shape)
-
-
-def _shape(kind: str, mode: str, spots: Sequence[Spot]) -> Xml.Element:
+def _shape(kind: str, mode: str, *spots: Spot) -> str:
     """Return a point, or a line that follows the ground where it is on it."""
-    drawn = [_tag("tessellate", "1")] if len(spots) > 1 else []
-    coordinates = _tag("coordinates", " ".join(map(_coordinates, spots)))
-    return _tag(kind, *drawn, _tag("altitudeMode", mode), coordinates)
+    drawn = _tag("tessellate", "1") if len(spots) > 1 else ""
+    coordinates = _tag("coordinates", _coordinates(*spots))
+    return _tag(kind, drawn + _tag("altitudeMode", mode) + coordinates)
 
 
-def _coordinates(spot: Spot, separator: str = ",") -> str:
-    """Return longitude, latitude (0.1 mm) and altitude."""
-    latitude, longitude, altitude = spot
-    return separator.join((f"{longitude:.9f}", f"{latitude:.9f}", f"{altitude:.3f}"))
+def _coordinates(*spots: Spot) -> str:
+    """Return longitude, latitude (0.1 mm) and altitude of places."""
+    return " ".join(f"{east:.9f},{north:.9f},{altitude:.3f}" for north, east, altitude in spots)
 
 
-def _tag(name: str, *inside: "Xml.Element | str") -> Xml.Element:
-    """Return the element `name` around a text, or around elements."""
-    element = Xml.Element(name)
-    for each in inside:
-        if isinstance(each, str):
-            element.text = _ILLEGAL.sub("?", each)
-        else:
-            element.append(each)
-    return element
+def _text(text: str) -> str:
+    return escape(_ILLEGAL.sub("?", text))
+
+
+def _tag(name: str, inside: str) -> str:
+    return f"<{name}>{inside}</{name}>"

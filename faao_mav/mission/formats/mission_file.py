@@ -46,24 +46,19 @@ def not_read(mission: Mission) -> list[str]:
 
 def rally_left_out(mission: Mission, name: str) -> list[str]:
     """Return that the format `name` holds no rally points, if the mission has any."""
-    count = len(mission.rally)
-    points = f"{count} point{'' if count == 1 else 's'}"
-    return [f"{name} holds no rally points: {points} left out"] if count else []
+    points = f"{len(mission.rally)} point{'s' * (len(mission.rally) > 1)}"
+    return [f"{name} holds no rally points: {points} left out"] if mission.rally else []
 
 
-def zero_for_not_set(mission: Mission) -> list[str]:
-    """Return which values are not set, by item, if any: they are written as 0."""
+def zeros(mission: Mission, *, for_nan: bool) -> list[str]:
+    """Return what is written as 0: the home where none is known and, `for_nan`, what is not set."""
     places = [
         f"item {number} {name}"
         for number, item in enumerate(mission.items, start=1)
         for name, value in zip(_NAMES, item.numbers, strict=True)
-        if math.isnan(value)
+        if for_nan and math.isnan(value)
     ]
     more = f" and {len(places) - _SHOWN_ITEMS} more" if len(places) > _SHOWN_ITEMS else ""
-    shown = ", ".join(places[:_SHOWN_ITEMS])
-    return [f"not set (NaN) becomes 0: {shown}{more}"] if places else []
-
-
-def no_home(mission: Mission) -> list[str]:
-    """Return that no home is known, if so."""
-    return [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]
+    unset = [f"not set (NaN) becomes 0: {', '.join(places[:_SHOWN_ITEMS])}{more}"]
+    home = [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]
+    return [*(unset if places else []), *home]

@@ -13,13 +13,7 @@ from faao_mav.errors import MissionFileError
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, Command, Frame
 from faao_mav.mission.fence import MAX_CORNERS, Circle, Fence, LatLon, Polygon, RallyPoint
 from faao_mav.mission.formats.json_value import Json
-from faao_mav.mission.formats.mission_file import (
-    MissionFile,
-    PlanTarget,
-    no_home,
-    not_read,
-    zero_for_not_set,
-)
+from faao_mav.mission.formats.mission_file import MissionFile, PlanTarget, not_read, zeros
 from faao_mav.mission.item import BESIDE, MAX_ITEMS, Home, Mission, MissionItem
 
 _AGAIN = "open the file in a current QGroundControl and save it again"
@@ -117,9 +111,7 @@ def plan_losses(mission: Mission, target: PlanTarget | None) -> Iterator[str]:
         yield f"{line}; QGroundControl clears it there when it uploads this plan"
     if target is None:
         yield "no autopilot is known: the plan is for a generic one"
-    elif not target.takes_null:
-        yield from zero_for_not_set(mission)
-    yield from no_home(mission)
+    yield from zeros(mission, for_nan=target is not None and not target.takes_null)
 
 
 def _check_version(part: Json, version: int) -> None:

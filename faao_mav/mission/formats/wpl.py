@@ -21,14 +21,7 @@ from faao_mav.errors import MissionFileError, quote
 from faao_mav.mission.command import ABOVE_HOME, CIRCLE, FENCE_RETURN_POINT, POLYGON, Command, Frame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_items import fence_items, fence_of
-from faao_mav.mission.formats.mission_file import (
-    MissionFile,
-    PlanTarget,
-    no_home,
-    not_read,
-    rally_left_out,
-    zero_for_not_set,
-)
+from faao_mav.mission.formats.mission_file import MissionFile, not_read, rally_left_out, zeros
 from faao_mav.mission.item import MAX_ITEMS, Home, Mission, MissionItem, check_count, home_item
 
 HEADER = "QGC WPL 110"
@@ -68,13 +61,11 @@ def write_wpl(mission: Mission) -> str:
     return _text(mission.home, mission.items)
 
 
-def wpl_losses(mission: Mission, target: PlanTarget | None = None) -> Iterator[str]:
-    """Yield what of `mission` the files do not hold, whomever they are for."""
-    del target
+def wpl_losses(mission: Mission) -> Iterator[str]:
+    """Yield what of `mission` the files do not hold."""
     yield from not_read(mission)
     yield from rally_left_out(mission, "QGC WPL")
-    yield from zero_for_not_set(mission)
-    yield from no_home(mission)
+    yield from zeros(mission, for_nan=True)
     if mission.home is not None and math.isnan(mission.home.altitude):
         yield "the altitude of home is not known: the file says 0 m"
 
