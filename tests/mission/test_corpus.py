@@ -97,12 +97,12 @@ def test_the_sound_ones_are_read_the_odd_ones_with_warnings() -> None:
     assert warned == {"gap.waypoints", "home_in_frame_3.txt"}
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_is_refused(name: str) -> None:
-    with pytest.raises(MissionFileError, match=re.escape(REFUSED[name])) as caught:
-        read_mission(FOLDER / name)
-    assert str(caught.value).startswith(f"{FOLDER / name}: ")
-    assert "\n" not in str(caught.value)
+def test_the_others_are_refused() -> None:
+    for name, told in REFUSED.items():
+        with pytest.raises(MissionFileError, match=re.escape(told)) as caught:
+            read_mission(FOLDER / name)
+        assert str(caught.value).startswith(f"{FOLDER / name}: ")
+        assert "\n" not in str(caught.value)
 
 
 def test_what_else_the_files_tell() -> None:

@@ -18,7 +18,7 @@ from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import plan_target
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.mission.formats import read_mission, write_qgc_plan, write_wpl
+from faao_mav.mission.formats import read_mission, write_qgc_plan
 
 DATA = Path(__file__).parent.parent / "data" / "missions"
 
@@ -58,22 +58,6 @@ def client(request: pytest.FixtureRequest) -> Iterator[tuple[str, MissionRaw]]:
             thread.join()
         sdk.destroy()
         vehicle.close()
-
-
-def test_mavsdk_imports_the_mission(client: tuple[str, MissionRaw]) -> None:
-    autopilot, raw = client
-    mission = mission_of(*dash_hover_dash(), plan_with(autopilot=autopilot))
-    imported = raw.import_mission_planner_mission_from_string(write_wpl(mission)).mission_items
-    # It keeps row 0 as an item, and for ArduPilot puts another before it.
-    rows = imported[-len(mission.items) - 1 :]
-    assert len(imported) - len(rows) == (1 if autopilot == "ardupilot" else 0)
-
-    home = rows[0]
-    assert mission.home is not None
-    assert (home.command, home.frame) == (16, 0)
-    assert (home.x, home.y) == (round(mission.home.latitude * 1e7), 1491652370)
-    assert home.z == mission.home.altitude
-    assert_same(rows[1:], mission.items)
 
 
 def assert_same(rows: Sequence[Any], items: Sequence[MissionItem]) -> None:
