@@ -33,18 +33,11 @@ _OLD_HEADERS = {
 """What to do with files of earlier versions, by their header."""
 
 _PARAMS = ("param1", "param2", "param3", "param4")
-_FIELDS = {
-    "index": 65_535,
-    "current": 1,
-    "frame": 255,
-    "command": 65_535,
-    **dict.fromkeys(_PARAMS, math.inf),
-    "latitude": 90,
-    "longitude": 180,
-    "altitude": math.inf,
-    "autocontinue": 1,
-}
-"""The fields of a row, and the largest value of each."""
+_WHOLE = {"index": 65_535, "current": 1, "frame": 255, "command": 65_535, "autocontinue": 1}
+"""The fields of a row that are whole numbers, and the largest of each."""
+
+_DEGREES = {"latitude": 90, "longitude": 180}
+_FIELDS = (*list(_WHOLE)[:4], *_PARAMS, *_DEGREES, "altitude", "autocontinue")
 
 _FENCE = frozenset({FENCE_RETURN_POINT, *POLYGON.values(), *CIRCLE.values()})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
@@ -98,12 +91,10 @@ def read_wpl(text: str) -> MissionFile:
     `MissionFileError` for anything else; it names line, field, value and what is expected.
     """
     rows = _rows(text)
-    current = [row for row in rows if row["current"]]
+    current = [row for row in rows if row.current]
     if len(current) > 1:
-        raise current[1].wrong(
-            "current", f"expected 0: line {current[0].number} is already current"
-        )
-    mission = Mission(tuple(row.item() for row in rows[1:]), rows[0].home())
+        raise current[1].wrong("current", f"0: line {current[0].number} is already current")
+    mission = Mission(tuple(row.item for row in rows[1:]), rows[0].home())
     return MissionFile(mission, warnings=tuple(_oddities(rows, mission)))
 
 
@@ -113,20 +104,20 @@ def read_wpl_fence(text: str) -> Fence:
     A first row that is no fence item is the home row. What is tolerated is as in `read_wpl`.
     """
     rows = _rows(text)
-    if rows[0]["command"] not in _FENCE:
+    if rows[0].item.command not in _FENCE:
         rows.pop(0).home()
     for row in rows:
-        if row["command"] not in _FENCE:
-            raise row.wrong("command", "expected 5000 to 5004: a file of a fence holds no others")
-    return fence_of([row.item() for row in rows])
+        if row.item.command not in _FENCE:
+            raise row.wrong("command", "5000 to 5004: a file of a fence holds no others")
+    return fence_of([row.item for row in rows])
 
 
 def _oddities(rows: "Sequence[_Row]", mission: Mission) -> Iterator[str]:
     """Yield what is odd about a file that is read nevertheless."""
-    if rows[0]["frame"] in ABOVE_HOME and mission.home is not None:
+    if rows[0].item.frame in ABOVE_HOME and mission.home is not None:
         told = "row 0 is the home position; its altitude is taken as above mean sea level"
         yield f"{rows[0].place('frame')}: {told}"
-    odd = [row for index, row in enumerate(rows) if row["index"] != index]
+    odd = [row for index, row in enumerate(rows) if row.index != index]
     if odd:
         jumps = any(item.command == Command.DO_JUMP for item in mission.items)
         too = ", in which targets of DO_JUMP count too" if jumps else ""
@@ -156,7 +147,7 @@ def _rows(text: str) -> "list[_Row]":
 
 
 class _Row:
-    """A line's fields as text, each a number when it is asked for."""
+    """A row of the file: its item, and what else its fields say; `number` is that of its line."""
 
     def __init__(self, number: int, line: str) -> None:
         self.number, texts = number, re.split(r"[ \t]+", line)
@@ -166,49 +157,48 @@ class _Row:
                 f"tab-separated: {' '.join(_FIELDS)}"
             )
         self._texts = dict(zip(_FIELDS, texts, strict=True))
+        whole = {field: self._whole(field, most) for field, most in _WHOLE.items()}
+        self.index, self.current = whole["index"], whole["current"]
+        # In the mission frame the three coordinates are plain parameters.
+        limits = {} if whole["frame"] == Frame.MISSION else _DEGREES
+        reals = [self._real(field, limits.get(field, math.inf)) for field in _FIELDS[4:-1]]
+        a, b, c, d, x, y, z = reals
+        self.item = MissionItem(
+            whole["command"], whole["frame"], (a, b, c, d), x, y, z, bool(whole["autocontinue"])
+        )
 
     def place(self, field: str) -> str:
         return f"line {self.number}, field {field}: {quote(self._texts[field])}"
 
     def wrong(self, field: str, expected: str) -> MissionFileError:
-        return MissionFileError(f"{self.place(field)}; {expected}")
+        return MissionFileError(f"{self.place(field)}; expected {expected}")
 
-    def __getitem__(self, field: str) -> int:
-        text, largest = self._texts[field], _FIELDS[field]
-        if not (text.isascii() and text.isdigit() and float(text) <= largest):
-            raise self.wrong(field, f"expected a whole number from 0 to {largest}")
+    def _whole(self, field: str, most: int) -> int:
+        text = self._texts[field]
+        if not (text.isascii() and text.isdigit() and float(text) <= most):
+            raise self.wrong(field, f"a whole number from 0 to {most}")
         return int(text)
 
-    def real(self, field: str, *, on_earth: bool = True) -> float:
-        text, largest = self._texts[field], _FIELDS[field] if on_earth else math.inf
+    def _real(self, field: str, most: float) -> float:
+        text = self._texts[field]
         if field in _PARAMS and text.lower() == "nan":
             return math.nan
         value = float(text) if _NUMBER.fullmatch(text) else math.nan
-        if not (math.isfinite(value) and abs(value) <= largest):
-            span = f" from {-largest} to {largest} degrees" if largest < math.inf else ""
+        if not (math.isfinite(value) and abs(value) <= most):
+            span = f" from {-most} to {most} degrees" if most < math.inf else ""
             point = " with a decimal point, not a comma" if "," in text else ""
             unset = " or nan" if field in _PARAMS else ""
-            raise self.wrong(field, f"expected a finite number{point}{span}{unset}")
+            raise self.wrong(field, f"a finite number{point}{span}{unset}")
         return value
-
-    def item(self) -> MissionItem:
-        # In the mission frame the three coordinates are plain parameters.
-        on_earth = self["frame"] != Frame.MISSION
-        param1, param2, param3, param4 = map(self.real, _PARAMS)
-        x, y = self.real("latitude", on_earth=on_earth), self.real("longitude", on_earth=on_earth)
-        params, last = (param1, param2, param3, param4), bool(self["autocontinue"])
-        return MissionItem(
-            self["command"], self["frame"], params, x, y, self.real("altitude"), last
-        )
 
     def home(self) -> Home | None:
         # Every reader takes row 0 for home: an item there would never be flown.
-        for field, known in (
-            ("command", (Command.NAV_WAYPOINT, 0)),
-            ("frame", (Frame.GLOBAL, *ABOVE_HOME)),
+        for field, told, known in (
+            ("command", self.item.command, (Command.NAV_WAYPOINT, 0)),
+            ("frame", self.item.frame, (Frame.GLOBAL, *ABOVE_HOME)),
         ):
-            if self[field] not in known:
-                expected = f"expected {known[0]:d}: row 0 is the home position, not an item"
+            if told not in known:
+                expected = f"{known[0]:d}: row 0 is the home position, not an item"
                 raise self.wrong(field, expected)
-        place = self.real("latitude"), self.real("longitude"), self.real("altitude")
+        place = self.item.x, self.item.y, self.item.z
         return Home(*place) if any(place) else None
