@@ -18,8 +18,7 @@ from faao_mav.autopilot.vehicle import Vehicle
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import FLOWN_TO, Command
-from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.jumps import JUMPS, jump_target
+from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
 from faao_mav.vector import Vector
 
 LONGEST_COPTER = 5_400.0

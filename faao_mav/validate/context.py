@@ -14,8 +14,7 @@ from faao_mav.autopilot.dialect import SpeedChange, name_of
 from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
-from faao_mav.mission.item import Mission, MissionItem
-from faao_mav.mission.jumps import JUMPS, jump_target
+from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
 from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.energy import EnergyUse
 from faao_mav.validate.straight import HOME, PlacedItem, Straight

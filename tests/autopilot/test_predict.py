@@ -15,7 +15,7 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
-from faao_mav.mission.jumps import JUMPS
+from faao_mav.mission.item import JUMPS
 
 HOME = Home(47.4, 8.5, 400.0)
 FRAME = LocalFrame(47.4, 8.5)

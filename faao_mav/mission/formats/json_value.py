@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -41,15 +42,18 @@ class Json:
 
     def wrong(self, expected: str) -> MissionFileError:
         """Return the complaint that the value is not what is `expected`."""
-        return MissionFileError(
-            f"{self.place}: {quote(self.value)}; expected {expected}".removeprefix(": ")
-        )
+        told = f"{self.place}: {quote(self.value)}; expected {expected}"
+        return MissionFileError(told.removeprefix(": "))
+
+    def checked(self, right: bool, expected: str) -> Any:
+        """Return the value where it is `right`."""
+        if not right:
+            raise self.wrong(expected)
+        return self.value
 
     def get(self, key: str) -> "Json | None":
         """Return what the object has under `key`, None for nothing or null."""
-        if not isinstance(self.value, dict):
-            raise self.wrong("an object")
-        value = self.value.get(key)
+        value = self.checked(isinstance(self.value, dict), "an object").get(key)
         return None if value is None else Json(value, *self.steps, key)
 
     def __getitem__(self, key: str) -> "Json":
@@ -57,51 +61,40 @@ class Json:
             raise MissionFileError(f"{place_of((*self.steps, key))}: is missing")
         return found
 
-    def each(self, most: int | None = None) -> "list[Json]":
+    def each(self, most: float = math.inf) -> "list[Json]":
         """Return the values of the list, `most` at most."""
-        if not isinstance(self.value, list):
-            raise self.wrong("a list")
-        if most is not None and len(self.value) > most:
+        values = self.checked(isinstance(self.value, list), "a list")
+        if len(values) > most:
             raise MissionFileError(
                 f"{self.place}: more than {most:,} values, and no autopilot keeps so many"
             )
-        return [Json(value, *self.steps, k) for k, value in enumerate(self.value)]
+        return [Json(value, *self.steps, k) for k, value in enumerate(values)]
 
     def one_of(self, *words: str) -> str:
         """Return the value, one of `words`."""
-        if self.value not in words:
-            raise self.wrong(" or ".join(map(repr, words)))
-        return str(self.value)
+        return str(self.checked(self.value in words, " or ".join(map(repr, words))))
 
     def whole(self, most: int) -> int:
         """Return the whole number from 0 to `most`; some writers have 3.0 for 3."""
-        if not (
-            _is_number(self.value) and 0 <= self.value <= most and self.value == int(self.value)
-        ):
-            raise self.wrong(f"a whole number from 0 to {most}")
-        return int(self.value)
+        right = _is_number(self.value) and 0 <= self.value <= most and not self.value % 1
+        return int(self.checked(right, f"a whole number from 0 to {most}"))
 
     def flag(self) -> bool:
         """Return true or false."""
-        if not isinstance(self.value, bool):
-            raise self.wrong("true or false")
-        return self.value
+        return bool(self.checked(isinstance(self.value, bool), "true or false"))
 
-    def number(self, expected: str = "a finite number") -> float:
-        """Return the number; a message says that it is `expected`."""
-        if not _is_number(self.value):
-            raise self.wrong(expected)
-        return float(self.value)
+    def number(self, null: str = "") -> float:
+        """Return the number; with `null`, which says what it means, NaN for a null."""
+        if null and self.value is None:
+            return math.nan
+        meaning = f" or null ({null})" if null else ""
+        return float(self.checked(_is_number(self.value), f"a finite number{meaning}"))
 
     def numbers(self, count: int, null: str = "") -> list[float]:
-        """Return so many numbers; with `null`, which says what it means, NaN for a null."""
+        """Return so many numbers, each as `number` does."""
         values = self.each()
-        if len(values) != count:
-            raise self.wrong(f"a list of {count} values")
-        expected = f"a finite number or null ({null})" if null else "a finite number"
-        return [
-            math.nan if null and each.value is None else each.number(expected) for each in values
-        ]
+        self.checked(len(values) == count, f"a list of {count} values")
+        return [each.number(null) for each in values]
 
     def made(self, make: Callable[..., Made], *arguments: Any) -> Made:
         """Return `make(*arguments)`, with its `InputError` as a complaint about this place."""
@@ -118,9 +111,8 @@ def _is_number(value: Any) -> bool:
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    made: dict[str, Any] = {}
-    for key, value in pairs:
-        if key in made:
-            raise MissionFileError(f"key {quote(key)}: is there twice in one object; remove one")
-        made[key] = value
+    made = dict(pairs)
+    if len(made) < len(pairs):
+        (twice, _), *_ = Counter(key for key, _ in pairs).most_common(1)
+        raise MissionFileError(f"key {quote(twice)}: is there twice in one object; remove one")
     return made

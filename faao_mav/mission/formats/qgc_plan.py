@@ -51,11 +51,8 @@ def read_qgc_plan(text: str) -> MissionFile:
     _check_version(file, 1)
     plan = file["mission"]
     _check_version(plan, 2)
-    home, fence, rally = (
-        plan.get("plannedHomePosition"),
-        _part(file, "geoFence"),
-        _part(file, "rallyPoints"),
-    )
+    home = plan.get("plannedHomePosition")
+    fence, rally = _part(file, "geoFence"), _part(file, "rallyPoints")
     points = rally["points"].each(MAX_CORNERS) if rally else []
     whom = plan.get("firmwareType"), plan.get("vehicleType")
     firmware, vehicle_type = (None if each is None else each.whole(255) for each in whom)
@@ -181,12 +178,11 @@ def _read_item(item: Json, numbers: Mapping[float, int]) -> MissionItem:
 
 def _write_items(mission: Mission, whom: PlanTarget) -> Iterator[dict[str, Any]]:
     for number, item in enumerate(mission.items, start=1):
-        if item.command == Command.DO_JUMP and item.params[0] not in range(
-            1, len(mission.items) + 1
-        ):
+        last = len(mission.items)
+        if item.command == Command.DO_JUMP and item.params[0] not in range(1, last + 1):
             raise MissionFileError(
                 f"item {number}: DO_JUMP to {item.params[0]:g}; expected an item of the mission, "
-                f"1 to {len(mission.items)}"
+                f"1 to {last}"
             )
         not_set = None if whom.takes_null else 0
         params = [not_set if math.isnan(value) else value for value in item.numbers]
@@ -228,7 +224,7 @@ def _write_fence(fence: Fence) -> dict[str, Any]:
         for circle in fence.circles
     ]
     polygons = [
-        {"inclusion": polygon.inclusion, "polygon": list(map(list, polygon.vertices)), "version": 1}
+        {"inclusion": polygon.inclusion, "polygon": polygon.vertices, "version": 1}
         for polygon in fence.polygons
     ]
     back = {"breachReturn": _write_place(fence.breach_return)} if fence.breach_return else {}
