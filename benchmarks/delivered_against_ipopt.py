@@ -5,9 +5,10 @@
 
 The peer starts from five routes by way of the stations, as far as there is time to fly them, and
 `--random` ones. Rates are delivered rates in bit/s/Hz, computed for both by the same function from
-the positions alone. Seconds are those of the processor for the search: without the tables of the
-rates, which the peer is given ready made, and without the precoders of the flight that was found,
-which it does not seek; with the building of its model. `whole` is all that `optimize` takes.
+the positions alone; steps of a radio's own rates rise as wide as at first. Seconds are those of the
+processor for the search: without the tables of the rates, which the peer is given ready made, and
+without the precoders of the flight that was found, which it does not seek; with the building of its
+model. `whole` is all that `optimize` takes.
 Everything printed is measured in the run.
 """
 
@@ -75,6 +76,9 @@ PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
             "power": 30,
         },
     ),
+    ("wifi_relay", {}),
+    ("wifi_relay", {"radio.gain": {"elevation_db": [18, -30, 10]}, "power": 14}),
+    ("fsk_relay", {"radio.fading": "ergodic", "flight.duration": 300}),
     ("paper_active", {"flight.duration": 40}),
     ("paper_active", {"flight.duration": 50, "power": 10}),
     ("paper_active", {"flight.duration": 50, "radio.gain": {"elevation_db": [0, -20, 10]}}),
@@ -84,7 +88,8 @@ PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 def plan(name: str, changes: dict[str, Any]) -> Plan:
     """Read a sample plan for the direct method and the queue, with some keys replaced."""
-    data = load_yaml((MISSIONS / f"{name}.yaml").read_text(), name)
+    source = MISSIONS / f"{name}.yaml"
+    data = load_yaml(source.read_text(), name)
     data.setdefault("optimizer", {})["method"] = "direct"
     data["radio"]["causal"] = True
     for key, value in changes.items():
@@ -101,7 +106,7 @@ def plan(name: str, changes: dict[str, Any]) -> Plan:
         for parent in parents:
             section = section[parent]
         section[last] = value
-    return parse_plan(dump_yaml(data))
+    return parse_plan(dump_yaml(data), str(source))
 
 
 def by_ipopt(problem: Problem, field: RateField, random: int) -> tuple[float, list[float]]:
@@ -143,11 +148,16 @@ def by_direct(read: Plan) -> tuple[float, float, float]:
     with (
         patch("faao_mav.optimizer.direct.rate_field", timed(rate_field)),
         patch.object(direct, "_precoders", timed(direct._precoders)),
+        patch.object(direct, "_WIDTHS", ()),  # steps of a radio's rates as wide as the peer's
     ):
         began = time.process_time()
-        delivered = optimize(read).delivered_rate
+        solution = optimize(read)
         took = time.process_time() - began
-    return delivered, took - apart, took
+    if read.radio.rates is None:
+        return solution.delivered_rate, took - apart, took
+    problem = solution.problem
+    values = rate_field(problem, design(read)).value(solution.w.T[:, None])
+    return float(objectives(values, problem.kinematics, problem.relay)[0]), took - apart, took
 
 
 def main() -> None:

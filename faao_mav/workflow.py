@@ -298,7 +298,8 @@ def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
     started = time.perf_counter()
     solution = optimize(plan, observe=observe)
     seconds = time.perf_counter() - started
-    return Result(solution, price(solution), seconds_optimize=seconds)
+    information = price(solution) if plan.radio.rates is None else None
+    return Result(solution, information, seconds_optimize=seconds)
 
 
 def plan_mission(

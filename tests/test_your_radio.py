@@ -1,14 +1,23 @@
-"""The radio as it is in a plan: the law of the gain, from the plan or from a file beside it."""
+"""The radio as it is in a plan: the gain's law and the rates, from the plan or a file beside it."""
 
+import csv
+import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import SMALL, MakePlan, edited
 
 from faao_mav.errors import PlanError
+from faao_mav.fly.radio import Radios
+from faao_mav.optimizer.design import design
+from faao_mav.optimizer.interior.maximize import objectives
 from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.plan import parse_plan, read_plan
+from faao_mav.schedule.precoder_table import precoder_table
 
 LINK = """
 # fitted to three flights
@@ -78,3 +87,114 @@ def test_a_file_that_is_not_there_and_no_law_at_all(tmp_path: Path) -> None:
 def test_algorithm1_keeps_to_the_square_of_the_distance(paper_plan: MakePlan) -> None:
     with pytest.raises(PlanError, match=r"radio\.gain is not for algorithm1"):
         optimize(paper_plan({"radio.gain.exponent": 2.5}))
+
+
+TABLE = """# two columns count
+mcs, SNR_dB, "mbit_per_s"
+2, 12, 26
+0, 4, 6.5
+1, 7, 13
+"""
+WIFI = {"radio.rates": "rates.csv", "radio.bandwidth_mhz": 20}
+
+
+def tabled(folder: Path, changes: dict[str, Any] | None = None, table: str = TABLE) -> Path:
+    """Write a plan with the rates of a table into `folder`."""
+    (folder / "rates.csv").write_text(table)
+    return written(folder, WIFI | (changes or {}))
+
+
+def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> None:
+    plan = read_plan(tabled(tmp_path))
+    steps = plan.radio.rate_steps
+    assert steps is not None
+    assert (steps.snr_db, steps.rates) == ((4, 7, 12), (0.325, 0.65, 1.3))
+    assert parse_plan(plan.text).radio == plan.radio  # without the file
+    in_hertz = TABLE.replace("mbit_per_s", "bit_per_s_per_hz")
+    steps = read_plan(tabled(tmp_path, table=in_hertz)).radio.rate_steps
+    assert steps is not None
+    assert steps.rates == (6.5, 13, 26)
+
+
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s or bit_per_s_per_hz"),
+        ("snr,rate\n1,2\n", "line 1: columns 'snr, rate'"),
+        ("snr_db,mbit_per_s,bit_per_s_per_hz\n1,2,3\n", "line 1: columns"),
+        ("# x\nsnr_db,mbit_per_s\n1,2\n3,fast\n", "line 4: mbit_per_s: 'fast' is no number"),
+        ("snr_db,mbit_per_s\n1\n", "line 2: mbit_per_s: '' is no number"),
+        ("snr_db,mbit_per_s\n1,nan\n", "mbit_per_s[0]: nan is not a finite number"),
+        ("snr_db,mbit_per_s\n1,-2\n", "mbit_per_s[0]: -2.0 is not accepted"),
+        ("snr_db,mbit_per_s\n1,0\n", "mbit_per_s: none is above 0"),
+        ("snr_db,mbit_per_s\n", "the rates are missing"),
+    ],
+)
+def test_what_is_wrong_in_a_table_is_told(tmp_path: Path, table: str, told: str) -> None:
+    message = refused(tabled(tmp_path, table=table))
+    assert message.startswith(f"{tmp_path / 'plan.yaml'}: radio.rates")
+    assert told in message
+    assert len(message.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"radio.bandwidth_mhz": None}, "give radio.bandwidth_mhz"),
+        ({"optimizer.precoder": "zf"}, "optimizer.precoder: zf: "),
+        ({"optimizer.rate": "mutual_information"}, "optimizer.rate: mutual_information: "),
+        ({"optimizer.method": "algorithm1"}, "optimizer.method: algorithm1: "),
+        ({"radio.rates": {"snr_db": [1, 2], "mbit_per_s": [1]}}, "1 for 2 of snr_db"),
+    ],
+)
+def test_what_does_not_go_with_rates_of_the_radios_own(
+    tmp_path: Path, changes: dict[str, Any], told: str
+) -> None:
+    assert told in refused(tabled(tmp_path, changes))
+
+
+TEN: tuple[dict[str, Any], ...] = (
+    {},
+    {"radio.fading": "ergodic"},
+    {"radio.fading": "realization"},
+    {"radio.causal": True},
+    {"radio.causal": True, "radio.duplex": "half"},
+    {"radio.gain.elevation_db": [18, -30, 10]},
+    {"radio.gain.exponent": 2.2, "radio.reference_gain_db": -46},
+    {"radio.relay.antennas": 1},
+    {"flight.altitude": 80},
+    {"vehicle.max_speed": 8, "flight.duration": 20},
+)
+FAINT = {"radio.base_station.power_dbm": -5, "radio.relay.power_dbm": -3, "flight.duration": 30}
+
+
+@pytest.mark.parametrize("changes", TEN)
+def test_what_is_priced_is_what_was_maximised(tmp_path: Path, changes: dict[str, Any]) -> None:
+    """Steps along the flight, and the same that rise over half a decibel; no bound is below."""
+    plan = read_plan(tabled(tmp_path, {"radio.fading": "none"} | FAINT | changes))
+    solution = optimize(plan)
+    problem, queue = solution.problem, solution.problem.maximised_queue
+    field = rate_field(problem, design(plan), 0.5)
+    smooth = objectives(field.value(solution.w.T[:, None]), problem.kinematics, queue)[0]
+    priced = solution.delivered_rate if queue else solution.rates.R_avg
+    assert priced == pytest.approx(smooth, rel=0.01)
+    assert (np.diff(solution.history) >= 0).all()
+    assert solution.residuals()["(9) rate"] < 1e-12
+    for rates in (solution.I_U, solution.I_G):
+        had = [0, 0.325, 0.65, 1.3]
+        assert plan.radio.fading == "ergodic" or np.isin(rates.round(6), had).all()
+    assert priced <= upper_bound(problem).value
+
+
+def test_each_slot_has_its_step(tmp_path: Path) -> None:
+    solution = optimize(read_plan(tabled(tmp_path, {"radio.fading": "none"} | FAINT)))
+    steps = solution.steps
+    assert steps is not None
+    rates = np.array([0, 0.325, 0.65, 1.3])
+    np.testing.assert_allclose(rates[steps[0]], solution.I_U)
+    np.testing.assert_allclose(rates[steps[1]], solution.I_G)
+    rows = list(csv.DictReader(precoder_table(solution).splitlines()))
+    assert [int(row["step_U"]) for row in rows] == steps[1].tolist()
+    line = Radios(solution, "udp:127.0.0.1:9").line(3.0, solution.w[6])
+    assert line is not None
+    assert json.loads(line)["step_B"] == steps[0][6]

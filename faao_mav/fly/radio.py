@@ -42,7 +42,8 @@ class Radios:
         by place while it is near flight.start. None, too, before and after the plan's time.
 
         It is a JSON object: `slot`; `t`, s; `east` and `north`, m, where the aircraft is; `P_B` and
-        `P_U`, rows of [real, imaginary], sqrt(W); `receive_share`, null in full duplex.
+        `P_U`, rows of [real, imaginary], sqrt(W); `receive_share`, null in full duplex; `step_B`
+        and `step_U`, the numbers of the rates of both hops, null without `radio.rates`.
         """
         solution, plan = self._solution, self._solution.plan
         away = float(lengths(w - solution.w[0]))
@@ -64,6 +65,8 @@ class Radios:
             "P_B": _pairs(solution.P_B[slot]),
             "P_U": _pairs(solution.P_U[slot]),
             "receive_share": None if solution.shares is None else float(solution.shares[slot]),
+            "step_B": None if solution.steps is None else int(solution.steps[0][slot]),
+            "step_U": None if solution.steps is None else int(solution.steps[1][slot]),
         }
         return json.dumps(told)
 

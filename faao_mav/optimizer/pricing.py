@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.errors import InputError
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.solution import Solution
@@ -70,8 +71,11 @@ class MutualInformation:
 def price(solution: Solution) -> MutualInformation:
     """Return the mutual information of both links along `solution`, bit/s/Hz.
 
-    The noises are fixed: the same plan gives the same value.
+    The noises are fixed: the same plan gives the same value. Raises `InputError` for a plan whose
+    `radio.rates` take the place of the alphabet.
     """
+    if solution.plan.radio.rates is not None:
+        raise InputError("radio.rates: rates of the radio's own have no mutual information")
     problem = solution.problem
     (bs_uav, I_U, first), (uav_user, I_G, second) = (
         _information(link, link.channel(solution.w, H_r), P)
@@ -151,7 +155,8 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
     slots = len(solution.w)
     quick = how.blind and solution.plan.optimizer.rate == "cutoff"
-    quick &= all(len(link.classes.vectors) <= _FEW_CLASSES for link in problem.links)
+    if solution.plan.radio.rates is None:
+        quick &= all(len(link.classes.vectors) <= _FEW_CLASSES for link in problem.links)
     step = -(-slots // (_FRESH_SLOTS if quick else _FEW_FRESH_SLOTS))
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
@@ -202,7 +207,7 @@ class Saturation:
 def saturation(solution: Solution) -> Saturation:
     """Return how far into saturation `solution` is, with its own route, precoders and shares."""
     problem = solution.problem
-    full = [np.full(len(solution.w), float(link.classes.bits)) for link in problem.links]
+    full = [np.full(len(solution.w), link.most) for link in problem.links]
 
     def maximised(I_U: Real, I_G: Real, shares: Real | None) -> float:
         if (queue := problem.maximised_queue) is not None:

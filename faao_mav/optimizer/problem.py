@@ -13,7 +13,7 @@ from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.optimizer.size import check_size
 from faao_mav.plan import Plan, Vector
-from faao_mav.radio.best_precoder import best_precoders
+from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.channel import (
     balanced_rayleigh,
     line_of_sight_all_ones,
@@ -27,6 +27,7 @@ from faao_mav.radio.constellation import (
 )
 from faao_mav.radio.gain import PathGain
 from faao_mav.radio.rate import Measure, draw_rates
+from faao_mav.radio.rate_steps import RateSteps, one_stream
 from faao_mav.radio.relay import RelayQueue
 
 if TYPE_CHECKING:
@@ -42,7 +43,8 @@ class Link:
     the path gain;
     `receive` and `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
     slot (N + 2, N_r, N_t), draws to be averaged over (S, 1, N_r, N_t), or None for the line of
-    sight alone. `measure` is the rate that counts, `optimizer.rate`.
+    sight alone. `measure` is the rate that counts, `optimizer.rate`. With `steps` the rates are
+    these, of one stream, whatever the alphabet.
     """
 
     name: str
@@ -59,11 +61,22 @@ class Link:
     line_of_sight: str
     nlos: Complex | None
     measure: Measure = "cutoff"
+    steps: RateSteps | None = None
 
     @cached_property
     def classes(self) -> DifferenceClasses:
         """The differences u_mk of this link's input vectors, merged up to a unit phase."""
         return difference_classes(self.modulation, self.transmit)
+
+    @property
+    def most(self) -> float:
+        """The highest rate, bits: N log2(rho), or the highest step."""
+        return float(self.classes.bits) if self.steps is None else self.steps.most
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether the precoder of highest rate for one channel has a closed form."""
+        return self.steps is not None or has_closed_form(self.modulation, self.transmit)
 
     @property
     def follows_position(self) -> bool:
@@ -133,6 +146,8 @@ class Link:
         P is (..., N_t, N_t), or has the axis of the draws too. Of the mutual information the mean
         over the draws is accurate: see `radio.rate`.
         """
+        if self.steps is not None:
+            return self.steps.value(self.snr(H, P))
         if not self.averaged:
             H, P = H[..., None, :, :], P[..., None, :, :]
             return draw_rates(self.measure, H, P, self.modulation, self.noise)[..., 0]
@@ -141,11 +156,18 @@ class Link:
         rates = draw_rates(self.measure, H, P, self.modulation, self.noise)
         return np.ascontiguousarray(np.moveaxis(rates, -1, 0))
 
+    def snr(self, H: Complex, P: Complex) -> Real:
+        """Return ||H P||² / sigma², the SNR of one stream, linear, for H and P of `draw_rates`."""
+        A = H @ P
+        return np.asarray(np.sum(A.real**2 + A.imag**2, axis=(-2, -1)) / self.noise)
+
     def best(self, draws: Complex, start: Complex | None = None) -> Complex:
         """Return the precoder (..., N_t, N_t) of highest mean rate over draws (..., S, N_r, N_t).
 
         The search begins at `start` (..., N_t, N_t) where given.
         """
+        if self.steps is not None:
+            return one_stream(draws, self.power)
         return best_precoders(
             draws, self.power, self.modulation, self.noise, measure=self.measure, start=start
         )
@@ -290,6 +312,7 @@ def build_problem(plan: Plan) -> Problem:
             line_of_sight=radio.line_of_sight,
             nlos=nlos,
             measure=plan.optimizer.rate,
+            steps=radio.rate_steps,
         )
 
     return Problem(

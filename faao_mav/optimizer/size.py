@@ -30,8 +30,10 @@ def check_size(plan: Plan) -> None:
     draws = radio.fading_samples if radio.fading == "ergodic" else 1
     sums = _SEARCH * slots if radio.fading == "realization" else draws * (_TABLE + slots)
     most = max(base, relay)
-    inputs = len(constellation(radio.modulation)) ** most
-    differences = difference_vector_count(radio.modulation, most)
+    inputs, differences = 1, 1
+    if radio.rates is None:
+        inputs = len(constellation(radio.modulation)) ** most
+        differences = difference_vector_count(radio.modulation, most)
     for what, number, cap in (
         ("vectors of symbols", inputs, MAX_INPUTS),
         ("numbers in its channels", slots * draws * relay * (base + user), MAX_CHANNELS),

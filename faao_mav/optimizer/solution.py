@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import InputError, quote
 from faao_mav.files import write_whole
 from faao_mav.optimizer.archive import read_archive
@@ -168,6 +168,22 @@ class Solution:
     def delivered_rate(self) -> float:
         """The delivered rate R_del, the mean of what is forwarded, bit/s/Hz; at most R_avg."""
         return self.relayed.rate
+
+    @cached_property
+    def steps(self) -> tuple[Integers, Integers] | None:
+        """Which of the radio's own rates the hops have in each slot, (n,): 1 is the lowest, 0 none.
+
+        Where the fading is averaged over it is that of the mean SNR. None without `radio.rates`.
+        """
+        found = []
+        for link, H_r, P in zip(
+            self.problem.links, (self.H_rB, self.H_rU), (self.P_B, self.P_U), strict=True
+        ):
+            if link.steps is None:
+                return None
+            snr = link.snr(link.channel(self.w, H_r), P)
+            found.append(link.steps.number(snr.mean(axis=0) if link.averaged else snr))
+        return found[0], found[1]
 
     @property
     def energy_wh(self) -> float | None:

@@ -33,6 +33,7 @@ def problems(plan: PlanContents) -> Iterator[str]:
     yield from _speeds(plan)
     yield from _relay(plan)
     yield from _gain(plan)
+    yield from _rates(plan)
     yield from _steps(plan.flight)
     yield from _distance(plan)
     yield from _goal(plan)
@@ -112,6 +113,35 @@ def _relay(plan: PlanContents) -> Iterator[str]:
             "radio.causal: true: algorithm1 (optimizer.method) maximises R_avg, whatever of it is "
             "delivered; give radio.causal: false, or method direct"
         )
+
+
+def _rates(plan: PlanContents) -> Iterator[str]:
+    rates, optimizer = plan.radio.rates, plan.optimizer
+    if rates is None:
+        return
+    given = [name for name in ("mbit_per_s", "bit_per_s_per_hz") if getattr(rates, name)]
+    if len(given) != 1:
+        told = "both are given" if given else "the rates are missing"
+        yield f"radio.rates: {told}; give mbit_per_s or bit_per_s_per_hz"
+        return
+    values = getattr(rates, given[0])
+    if len(values) != len(rates.snr_db):
+        yield (
+            f"radio.rates.{given[0]}: {len(values)} for {len(rates.snr_db)} of snr_db; give one "
+            "for each"
+        )
+    if not any(values):
+        yield f"radio.rates.{given[0]}: none is above 0; give what the radio carries"
+    if given == ["mbit_per_s"] and plan.radio.bandwidth_mhz is None:
+        yield "radio.rates.mbit_per_s: need the band that they are had in: give radio.bandwidth_mhz"
+    for key, needed in (
+        ("method", "direct"), ("precoder", "faao"), ("inputs", "alphabet"), ("rate", "cutoff")
+    ):  # fmt: skip
+        if (value := getattr(optimizer, key)) != needed:
+            yield (
+                f"optimizer.{key}: {value}: radio.rates has one stream along the best mode, with "
+                f"rates of its own; leave {key} out"
+            )
 
 
 def _gain(plan: PlanContents) -> Iterator[str]:

@@ -1,7 +1,9 @@
 """What the plan says of both links: `radio`."""
 
 from dataclasses import field
-from typing import Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field
 
 from faao_mav.plan.fields import (
     Antennas,
@@ -19,12 +21,15 @@ from faao_mav.plan.fields import (
     watts,
 )
 from faao_mav.radio.gain import PathGain
+from faao_mav.radio.rate_steps import RateSteps
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
 LineOfSight: TypeAlias = Literal["ula", "all_ones"]
 Fading: TypeAlias = Literal["ergodic", "realization", "none"]
 ChannelKnowledge: TypeAlias = Literal["statistical", "instantaneous"]
 Duplex: TypeAlias = Literal["full", "half"]
+
+_Rate: TypeAlias = Annotated[Number, Field(ge=0, le=1e6)]
 
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
 
@@ -50,6 +55,19 @@ class GainLaw:
         "Distance at which shadowing is correlated by 1/e.", "(0, 10000] m", default=50.0
     )
     about: Text = key("What it was found from.", accepted="one line of text", default="")
+
+
+@section
+class RadioRates:
+    """The rates that the radio has, in place of the alphabet's, by the least SNR of each."""
+
+    snr_db: tuple[Number, ...] = key("Least SNR.", "dB", "a list of numbers", max_length=1000)
+    mbit_per_s: tuple[_Rate, ...] = key(
+        "Rates in the band of radio.bandwidth_mhz.", "Mbit/s", "a list of numbers", default=()
+    )
+    bit_per_s_per_hz: tuple[_Rate, ...] = key(
+        "Rates, instead of mbit_per_s.", "bit/s/Hz", "a list of numbers", default=()
+    )
 
 
 _GAIN_FILE = "a mapping with reference_gain_db, exponent, elevation_db, or the name of a file"
@@ -101,6 +119,11 @@ class Radio:
     relay: Relay = field(default_factory=Relay)
     ground_user: GroundUser
     modulation: Modulation = key("The alphabet of both hops.", default="bpsk")
+    rates: RadioRates | None = key(
+        "The radio's own rates, of one stream, in place of the alphabet's.",
+        accepted="a mapping with snr_db and mbit_per_s or bit_per_s_per_hz, or the name of a .csv",
+        default=None,
+    )
     reference_gain: Gain = key(
         "Power gain rho_0 at 1 m.", "dB", name="reference_gain_db", default=_GAIN
     )
@@ -148,6 +171,14 @@ class Radio:
     def maximised(self) -> str:
         """The name of the rate that is maximised."""
         return "R_del" if self.causal else "R_avg"
+
+    @property
+    def rate_steps(self) -> RateSteps | None:
+        """The radio's own rates, bit/s/Hz; None where they are the alphabet's."""
+        if self.rates is None:
+            return None
+        megabits = [rate / (self.bandwidth_mhz or 1.0) for rate in self.rates.mbit_per_s]
+        return RateSteps.of(self.rates.snr_db, self.rates.bit_per_s_per_hz or megabits)
 
     @property
     def gain_laws(self) -> tuple[GainLaw, GainLaw]:

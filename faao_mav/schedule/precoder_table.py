@@ -36,9 +36,11 @@ def precoder_table(solution: Solution) -> str:
 
     Columns: `slot`; `t_s`, when it begins on the plan's clock, s; `east_m`, `north_m`,
     `latitude_deg`, `longitude_deg`, where the aircraft then is; in half duplex `receive_share`, the
-    share of the slot in which it receives, before it sends; the entries of P_B and P_U, row by
-    row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`; and `taken_by`: `time` where a late aircraft
-    takes the row of the time, `place` where that of the nearest place (see `taken_by`).
+    share of the slot in which it receives, before it sends; with `radio.rates` `step_B` and
+    `step_U`, the numbers of the rates of both hops, 1 the lowest, 0 none; the entries of P_B and
+    P_U, row by row, sqrt(W), each as `P_B_1_1_re`, `P_B_1_1_im`; and `taken_by`: `time` where a
+    late aircraft takes the row of the time, `place` where that of the nearest place (see
+    `taken_by`).
 
     Raises `InputError` as `check_of_slots` does.
     """
@@ -51,6 +53,9 @@ def precoder_table(solution: Solution) -> str:
     if solution.shares is not None:
         names.append("receive_share")
         columns.append(solution.shares)
+    if solution.steps is not None:
+        names += ["step_B", "step_U"]
+        columns += solution.steps
     for name, P in (("P_B", solution.P_B), ("P_U", solution.P_U)):
         rows, entries = P.shape[1:]
         places = [f"{i + 1}_{j + 1}" for i in range(rows) for j in range(entries)]

@@ -1,6 +1,7 @@
 """Rates as functions of the position: derivatives, and tables against exact values."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -121,6 +122,37 @@ def test_another_law_of_the_gain(small_plan: MakePlan, fading: str, precoder: st
         gradient, hessian = derivatives(link, rate, w)
         assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
         assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("fading", "csi", "antennas"),
+    [
+        ("none", "statistical", 2),
+        ("realization", "statistical", 3),
+        ("ergodic", "statistical", 2),
+        ("ergodic", "instantaneous", 2),
+    ],
+)
+def test_steps_of_a_radio_that_rise_are_one_table(
+    small_plan: MakePlan, fading: str, csi: str, antennas: int
+) -> None:
+    changes = {f"radio.{name}.antennas": antennas for name in ("base_station", "relay")}
+    steps = {"snr_db": [2, 6, 11, 15], "bit_per_s_per_hz": [0.5, 1, 2, 3.5]}
+    changes |= {"radio.fading": fading, "radio.csi": csi, "radio.fading_samples": 4}
+    plan = small_plan(changes | {"radio.rates": steps})
+    wanted = design(plan)
+    link = build_problem(plan).bs_uav
+    assert link.steps is not None
+    link = replace(link, steps=link.steps.widened(3.0))
+    rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
+
+    def value(at: Real) -> Real:
+        return rate.value(*coordinates(link, at))
+
+    assert value(w) == pytest.approx(exactly(link, wanted, w), abs=1e-3)
+    gradient, hessian = derivatives(link, rate, w)
+    assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
+    assert hessian == pytest.approx(hessian_by_differences(value, w), rel=2e-2, abs=1e-4)
 
 
 def exactly(link: Link, wanted: Design, w: Real) -> Real:

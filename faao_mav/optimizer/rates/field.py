@@ -1,7 +1,7 @@
 """Both links' rates as functions of the UAV's position: what a flight maximises the means of."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,15 +41,27 @@ class RateField:
         return StageValues(value, gradient, hessian)
 
 
-def rate_field(problem: Problem, design: Design) -> RateField:
-    """Return the rates of `problem` under `design`, as far as a flight can reach."""
+_LEAST_WIDTH = 4.0
+"""Decibels over which steps of the SNR rise at least, before they are sharpened. Chosen."""
+
+
+def rate_field(problem: Problem, design: Design, width: float | None = None) -> RateField:
+    """Return the rates of `problem` under `design`, as far as a flight can reach.
+
+    Steps of the radio's own rates rise over `width` dB, by default so wide that there is no flat
+    between them.
+    """
     kin = problem.kinematics
+    links = problem.links
+    if (steps := problem.plan.radio.rate_steps) is not None:
+        steps = steps.widened(width or max(steps.gap, _LEAST_WIDTH))
+        links = replace(links[0], steps=steps), replace(links[1], steps=steps)
     reach = kin.max_speed * kin.time_step * (kin.slots - 1)
     farthest = []
-    for link in problem.links:
+    for link in links:
         from_ends = max(np.linalg.norm(end - link.station) for end in (kin.start, kin.end))
         farthest.append(float(from_ends) + reach / 2)
-    return RateField(problem.links, rate_models(problem.links, design, farthest))
+    return RateField(links, rate_models(links, design, farthest))
 
 
 def rate_models(

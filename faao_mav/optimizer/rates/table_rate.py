@@ -24,7 +24,7 @@ from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import RatePartials
 from faao_mav.optimizer.rates.spline import Spline
-from faao_mav.radio.best_precoder import has_closed_form
+from faao_mav.radio.gain import PER_DB
 
 Kind: TypeAlias = Literal["curve", "surface", "modes"]
 
@@ -49,6 +49,9 @@ _DIRECTIONS, _RATIOS, _INFORMATION_RATIOS = 65, 17, 9
 _ALIKE = 0.3
 """The distance, in their size, up to which precoders of neighbouring points are of one kind: those
 between serve as starts. Chosen."""
+
+_PER_RISE = 12
+"""Spacings of the grid of x over which a step of a radio's own rates rises, at least. Chosen."""
 
 _SAME = 1e-6
 """Gain, bit, below which a precoder found from another start is the same, in another form. Those of
@@ -87,19 +90,20 @@ class TableRate:
     @property
     def exact(self) -> bool:
         """Whether no searched precoders were interpolated between known draws."""
-        closed = has_closed_form(self.link.modulation, self.link.transmit)
-        return self.kind != "modes" or (closed and self.link.measure == "cutoff")
+        closed = self.link.closed_form and self.link.measure == "cutoff"
+        return self.kind != "modes" or closed
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (..., n)."""
         shift, y = self.still or _shifted(self.link, self.kind, cosine)
-        return self.table.spline.value(gain_log + shift, y)
+        return np.maximum(0.0, self.table.spline.value(gain_log + shift, y))
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
         """Return the rate and its derivatives by l and u, bits (..., n)."""
         if self.still:
             shift, y = self.still
-            return RatePartials(*self.table.spline.by_x(gain_log + shift, y))
+            value, by_l, by_ll = self.table.spline.by_x(gain_log + shift, y)
+            return RatePartials(np.maximum(0.0, value), by_l, by_ll)
         here, up, down = (_shifted(self.link, self.kind, cosine + h) for h in (0.0, _STEP, -_STEP))
         x_u, y_u = ((a - b) / (2 * _STEP) for a, b in zip(up, down, strict=True))
         x_uu, y_uu = ((a - 2 * m + b) / _STEP**2 for a, m, b in zip(up, here, down, strict=True))
@@ -108,7 +112,7 @@ class TableRate:
         )
         bent = by_xx * x_u**2 + 2 * by_xy * x_u * y_u + by_yy * y_u**2
         return RatePartials(
-            value,
+            np.maximum(0.0, value),
             by_l=by_x,
             by_ll=by_xx,
             by_u=by_x * x_u + by_y * y_u,
@@ -147,7 +151,7 @@ def kind_of(link: Link, design: Design) -> Kind | None:
 
 
 def _few_modes(link: Link) -> bool:
-    return min(link.receive, link.transmit) <= 2
+    return link.steps is not None or min(link.receive, link.transmit) <= 2
 
 
 def table_rates(
@@ -184,6 +188,9 @@ def _shifted(link: Link, kind: Kind, cosine: Real) -> tuple[Real, Real]:
     if kind != "modes":
         return np.full(cosine.shape, snr), cosine if kind == "surface" else np.zeros(cosine.shape)
     H_r = link.fade(link.line_of_sight_at(cosine))
+    if link.steps is not None:
+        mode = np.linalg.norm(H_r, 2, axis=(-2, -1))
+        return 2 * np.log(mode) + snr, np.zeros_like(mode)
     if H_r.shape[-2] > H_r.shape[-1]:
         H_r = np.swapaxes(H_r, -1, -2)
     trace = np.sum(H_r.real**2 + H_r.imag**2, axis=(-2, -1))
@@ -205,6 +212,8 @@ def _table(link: Link, kind: Kind, design: Design, low: float, high: float) -> T
     """
     cutoff = link.measure == "cutoff"
     every = round(_WHOLE / (_SPACING if cutoff else _INFORMATION_SPACING))
+    if link.steps is not None:
+        every = max(every, math.ceil(_WHOLE * _PER_RISE / (PER_DB * link.steps.width)))
     first = math.floor((low - _MARGIN) / _WHOLE)
     steps = math.ceil((high + _MARGIN) / _WHOLE) - first
     x = _WHOLE * np.linspace(first, first + steps, steps * every + 1)
@@ -213,7 +222,7 @@ def _table(link: Link, kind: Kind, design: Design, low: float, high: float) -> T
     if kind == "modes":
         unit, design = replace(unit, nlos=None), replace(design, averaged=False, blind=False)
         modes = min(link.receive, link.transmit)
-        if modes == 2:
+        if modes == 2 and link.steps is None:
             y = np.linspace(0, 1, _RATIOS if cutoff else _INFORMATION_RATIOS)
         H = np.zeros((len(y), modes, link.transmit), dtype=np.complex128)
         H[:, 0, 0] = 1.0
@@ -222,7 +231,7 @@ def _table(link: Link, kind: Kind, design: Design, low: float, high: float) -> T
         if kind == "surface":
             y = np.linspace(-1, 1, _DIRECTIONS)
         H = link.fade(link.line_of_sight_at(y))
-    key = (design, link.measure, link.modulation, x[0], x[-1], H.shape, H.tobytes())
+    key = (design, link.measure, link.modulation, link.steps, x[0], x[-1], H.shape, H.tobytes())
     if key not in _tables:
         while len(_tables) >= _KEPT:
             del _tables[next(iter(_tables))]
@@ -240,7 +249,7 @@ def _made(unit: Link, design: Design, x: Real, y: Real, H: Complex) -> Table:
         return Table(Spline.through(x, y, mean[:, None]), P)
     scaled = np.exp(x / 2)[:, None, None, None] * H[..., None, :, :, :]
     flat = scaled.reshape(*H.shape[:-3], len(x) * len(y), *H.shape[-2:])
-    closed = has_closed_form(unit.modulation, unit.transmit) and not design.blind
+    closed = unit.steps is not None or (unit.closed_form and not design.blind)
     if design.optimal and not closed:
         P = _searched(unit, design, flat, len(y))
     else:

@@ -9,13 +9,16 @@ from faao_mav.optimizer.design import design
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
-from faao_mav.radio.best_precoder import has_closed_form
 
 _SEARCHED = 25
 """Gains at which precoders are searched where there is no table of modes. Chosen."""
 
 _DIRECTIONS = 257
 """Directions u over which the largest singular values are taken. Chosen."""
+
+
+_WIDTH = 0.25
+"""Decibels before its SNR over which a step of a radio's own rates rises in a bound. Chosen."""
 
 
 def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
@@ -25,7 +28,9 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     upper bound: each singular value of H_r is the largest over all directions.
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
-    exact = has_closed_form(link.modulation, link.transmit) and link.measure == "cutoff"
+    exact = link.closed_form and link.measure == "cutoff"
+    if link.steps is not None:
+        link = replace(link, steps=link.steps.above(_WIDTH))
     gain_log = link.law.log(r**2 + link.altitude**2, link.altitude).T
     if link.nlos is not None and not optimal.averaged:
         singular = _largest_singular_values(link, len(r))

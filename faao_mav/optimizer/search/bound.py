@@ -49,7 +49,7 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
 
     tell(0, "the best rates", known)
     rates, exact = radial_rates(problem)
-    ceiling = float(min(link.classes.bits for link in problem.links))
+    ceiling = min(link.most for link in problem.links)
     relay, kin = problem.maximised_queue, problem.kinematics
     half = relay is not None and relay.half
     value = ceiling
