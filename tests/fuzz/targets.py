@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from functools import partial
 from pathlib import Path
 
 import mutate
@@ -54,6 +55,9 @@ fence:
 """
 )
 
+_LINK = b"reference_gain_db: -44.5\nelevation_db: [18, -30, 10]\nspread_db: 5.5\nabout: May\n"
+_RATES = b"# own\nmcs, snr_db, mbit_per_s\n0, 4, 6.5\n1, 7, 13\n2, 9.5, 19.5\n"
+
 _LARGEST_SEED = 5_000
 """Bytes of a mission that is mutated; chosen: small ones are read often."""
 
@@ -61,6 +65,10 @@ _CHANGES = {".npz": mutate.archive} | dict.fromkeys((".bin", ".tlog", ".ulg"), m
 """How files with these endings are mutated; others are as text."""
 
 _VALUES = (b"flight.duration=60:120:30", b"power_dbm=-40:0:5,7", b"radio.modulation=bpsk,8psk")
+
+
+def _beside(plan: Path, _: Path) -> object:
+    return read_plan(plan)
 
 
 def targets(directory: Path) -> dict[str, Target]:
@@ -75,9 +83,15 @@ def targets(directory: Path) -> dict[str, Target]:
 
         found[name] = Target(name, run, seeds, _CHANGES.get(Path(file).suffix, mutate.text))
 
+    for beside in MISSIONS.glob("*.csv"):
+        (directory / beside.name).write_bytes(beside.read_bytes())
     plans = [path.read_bytes() for path in sorted(MISSIONS.glob("*.yaml"))]
     add("plan", "plan.yaml", read_plan, SMALL.encode(), _STUDY.encode(), *plans)
     add("fenced_plan", "fenced.yaml", read_plan, _FENCED.encode())
+    for key, name, seed in (("gain", "link.yaml", _LINK), ("rates", "rates.csv", _RATES)):
+        plan = directory / f"{key}.yaml"
+        plan.write_text(f"{SMALL}  bandwidth_mhz: 20\n  {key}: {name}\n")
+        add(key, name, partial(_beside, plan), seed)
     zones = _DATA / "fences" / "zones"
     for ending in ("kml", "geojson"):
         add(ending, f"fence.{ending}", _fence, zones.with_suffix(f".{ending}").read_bytes())

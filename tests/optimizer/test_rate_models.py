@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -136,7 +137,8 @@ def test_another_law_of_the_gain(small_plan: MakePlan, fading: str, precoder: st
 def test_steps_of_a_radio_that_rise_are_one_table(
     small_plan: MakePlan, fading: str, csi: str, antennas: int
 ) -> None:
-    changes = {f"radio.{name}.antennas": antennas for name in ("base_station", "relay")}
+    names = ("base_station", "relay")
+    changes: dict[str, Any] = {f"radio.{name}.antennas": antennas for name in names}
     steps = {"snr_db": [2, 6, 11, 15], "bit_per_s_per_hz": [0.5, 1, 2, 3.5]}
     changes |= {"radio.fading": fading, "radio.csi": csi, "radio.fading_samples": 4}
     plan = small_plan(changes | {"radio.rates": steps})
