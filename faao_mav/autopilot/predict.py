@@ -6,7 +6,7 @@ and the return are climbs and descents at constant speed with what the autopilot
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -100,21 +100,16 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
         index += 1
 
 
-@dataclass
-class _Stop:
-    """A point (3,), m, of a stretch, with its item and what a `FlightPath` says of it.
-
-    `waits` are further items that only make the aircraft wait here.
-    """
+class _Stop(NamedTuple):
+    """A point (3,), m, of a stretch, with its item and what a `FlightPath` says of it."""
 
     point: Real
     item: int
-    speed: float = math.nan
+    speed: float
     hold: float = 0.0
     delay: float = 0.0
     spline: bool = False
     radius: float = 0.0
-    waits: list[int] = field(default_factory=list)
 
 
 class _Walk:
@@ -154,7 +149,7 @@ class _Walk:
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
             case Command.NAV_DELAY if hovers and math.isfinite(number):
-                self._delay(index, number)
+                self._towards(index, self._last, delay=number)
             case Command.DO_CHANGE_SPEED:
                 self._change_speed(item)
             case command if command in FLOWN_TO:
@@ -162,7 +157,8 @@ class _Walk:
                 hold = number if hovers and command in _HOLDING and number < math.inf else 0.0
                 own = command == Command.NAV_WAYPOINT and 0 < radius < math.inf
                 spline = command == Command.NAV_SPLINE_WAYPOINT
-                self._towards(index, goal, hold, spline=spline, radius=radius if own else 0.0)
+                radius = radius if own else 0.0
+                self._towards(index, goal, hold=hold, spline=spline, radius=radius)
                 self.over = command == Command.NAV_LOITER_UNLIM
 
     def track(self) -> Track:
@@ -177,19 +173,19 @@ class _Walk:
     def _fly(self) -> None:
         """Fly the waypoints that are waiting."""
         stops, self._stretch = self._stretch, []
-        if len(stops) == 1:
-            self._go(stops[0].item, self._place, stops[0].delay)
-            self._reached[stops[0].waits] = self._clock
-        if len(stops) < 2:
+        if not stops:
             return
-        home = self._mission.home
+        home, start = self._mission.home, _Stop(self._place, 0, 0.0)
+        points, items, speeds, holds, delays, splines, radii = (
+            np.array(column) for column in zip(start, *stops, strict=True)
+        )
         path = FlightPath(
-            points=np.array([stop.point for stop in stops]),
-            speeds=np.array([stop.speed for stop in stops[1:]]),
-            holds=np.array([stop.hold for stop in stops]),
-            splines=np.array([stop.spline for stop in stops]),
-            radii=np.array([stop.radius for stop in stops]),
-            delays=np.array([stop.delay for stop in stops]),
+            points=points,
+            speeds=speeds[1:],
+            holds=holds,
+            splines=splines,
+            radii=radii,
+            delays=delays,
             longest=self._longest - self._clock,
             elevation=0.0 if home is None or math.isnan(home.altitude) else home.altitude,
             wind=self._wind,
@@ -200,12 +196,10 @@ class _Walk:
         end = float(flown.departures[-1])
         kept = flown.t <= end
         leg = np.searchsorted(flown.departures[1:], flown.t[kept], side="right")
-        items = np.array([stop.item for stop in stops[1:]])[np.minimum(leg, len(stops) - 2)]
         place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
-        for stop, done in zip(stops, flown.departures, strict=True):
-            own = [] if stop is stops[0] else [stop.item]
-            self._reached[own + stop.waits] = self._clock + done
-        self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], items)
+        self._reached[items[1:]] = self._clock + flown.departures[1:]
+        shown = items[1:][np.minimum(leg, len(stops) - 1)]
+        self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], shown)
         self._clock, self._place = self._clock + end, place
 
     def _at_least(self, path: FlightPath) -> float:
@@ -233,30 +227,30 @@ class _Walk:
         self._reached[index] = self._clock
 
     def _towards(
-        self, index: int, goal: Real, hold: float = 0.0, *, spline: bool = False, radius: float = 0
+        self,
+        index: int,
+        goal: Real,
+        *,
+        hold: float = 0.0,
+        delay: float = 0.0,
+        spline: bool = False,
+        radius: float = 0.0,
     ) -> None:
-        if np.abs(goal - self._last_stop(index).point).max() <= _SAME_PLACE:
-            self._delay(index, math.floor(hold) if self._type.whole_second_holds else hold)
-        else:
-            stop = _Stop(goal, index, self._speed, hold, spline=spline, radius=radius)
-            self._stretch.append(stop)
+        here = self._last
+        goal = here if np.abs(goal - here).max() <= _SAME_PLACE else goal
+        self._stretch.append(_Stop(goal, index, self._speed, hold, delay, spline, radius))
 
-    def _delay(self, index: int, seconds: float) -> None:
-        last = self._last_stop(index)
-        last.delay += seconds
-        last.waits.append(index)
-
-    def _last_stop(self, index: int) -> _Stop:
-        """Return where the stretch ends so far; it begins with item `index` where there is none."""
-        self._stretch = self._stretch or [_Stop(self._place, index)]
-        return self._stretch[-1]
+    @property
+    def _last(self) -> Real:
+        """Where the stretch ends so far, (3,) m."""
+        return self._stretch[-1].point if self._stretch else self._place
 
     def _circle(self, index: int, center: Real, orbit: Orbit) -> None:
         """Fly to the nearest place of a circle about `center` (3,), then round it.
 
         Speeds on it are those in calm air.
         """
-        here = self._last_stop(index).point
+        here = self._last
         edge = orbit.edge(center[:2], here[:2])
         self._towards(index, np.array([*edge, here[2] if orbit.climbs else center[2]]))
         self._fly()
@@ -280,7 +274,7 @@ class _Walk:
         self.over = self.over or orbit.endless
 
     def _land(self, index: int, item: MissionItem) -> None:
-        here = self._last_stop(index).point
+        here = self._last
         self._height(index, item)
         ground = here[:2]
         if (item.x or item.y) and not (math.isnan(item.x) or math.isnan(item.y)):

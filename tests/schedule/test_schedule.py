@@ -206,9 +206,10 @@ def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) 
     conversion = converted(t, w, plan)
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     whole = predict(conversion.mission, conversion.vehicle, frame)
-    waypoints = [
-        index
-        for index, item in enumerate(conversion.mission.items)
+    items = conversion.mission.items
+    waypoints = [  # or the delay at each, which ends later
+        index + (items[index + 1].command == Command.NAV_DELAY)
+        for index, item in enumerate(items)
         if item.command == Command.NAV_WAYPOINT
     ]
     assert not any(math.isnan(whole.reached[index]) for index in waypoints)
