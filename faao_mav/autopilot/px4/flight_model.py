@@ -17,7 +17,6 @@ from faao_mav.autopilot.px4.guidance import (
     headed,
     legs,
     level_setpoint,
-    stopping_distance,
 )
 from faao_mav.autopilot.px4.parameters import Px4Limits
 from faao_mav.autopilot.stepper import STEP, Copter, Samples
@@ -90,12 +89,13 @@ class Px4(Px4Limits):
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg flown at `speed`, m; same shape.
 
-        It must be able to stop at the next waypoint: that is its stopping distance.
+        It must be able to stop at the next waypoint: d = v (v + b) / 2 a with b = 4 a² / j.
 
         >>> float(Px4(acceleration=5.0, jerk=10.0).shortest_leg(np.array(8.0)))
         14.4
         """
-        return stopping_distance(self.jerk, self.acceleration, speed)
+        a = self.acceleration
+        return speed * (speed + 4 * a * a / self.jerk) / (2 * a)
 
     def radii(self, room: Real, turn: Real, stops: Flags) -> Real:
         """Return acceptance radii, m, for waypoints whose shorter leg is `room` (n,), m.

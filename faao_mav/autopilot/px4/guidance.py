@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import copysign, sqrt
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.px4.parameters import Px4Limits
@@ -25,8 +25,6 @@ other. PX4's own."""
 
 _TINY = 1e-9
 """Added to lengths, so that nothing is divided by 0."""
-
-_Speed = TypeVar("_Speed", float, Real)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +57,6 @@ def stopping_speed(jerk: float, acceleration: float, distance: float, final: flo
     b = 4 * acceleration * acceleration / jerk
     speed = (sqrt(b * b + 8 * acceleration * distance + 4 * final * final) - b) / 2
     return max(speed, final)
-
-
-def stopping_distance(jerk: float, acceleration: float, speed: _Speed) -> _Speed:
-    """Return from how far, m, `stopping_speed` to rest is `speed`: d = v (v + b) / 2 a."""
-    return speed * (speed + 4 * acceleration * acceleration / jerk) / (2 * acceleration)
 
 
 def corner_speed(limits: Px4Limits, radius: float, cosine: float) -> float:
