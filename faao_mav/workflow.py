@@ -302,15 +302,13 @@ def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
     return Result(solution, information, seconds_optimize=seconds)
 
 
-def plan_mission(
-    plan: Plan, *, method: str | None = None, bound: bool = False, observe: Observer | None = None
-) -> Result:
+def plan_mission(plan: Plan, *, bound: bool = False, observe: Observer | None = None) -> Result:
     """Optimise the flight of `plan` and make the mission that flies it.
 
-    `method`, where given, replaces `optimizer.method`; with `bound` what no route can exceed is
-    computed too; `observe` is told the progress. A flight that no mission can be made of is a
-    result without a mission: see `Result.no_mission`. Raises `PlanError` when the plan asks for
-    more than the method can handle, `InfeasibleError` when no flight satisfies it.
+    With `bound` what no route can exceed is computed too; `observe` is told the progress. A flight
+    that no mission can be made of is a result without a mission: see `Result.no_mission`. Raises
+    `PlanError` when the plan asks for more than the method can handle, `InfeasibleError` when no
+    flight satisfies it.
 
     >>> from faao_mav import read_plan
     >>> result = plan_mission(read_plan("missions/copter_relay.yaml"))
@@ -322,8 +320,6 @@ def plan_mission(
     ['WPNAV_ACCEL', 'WPNAV_JERK']
     """
     started = time.perf_counter()
-    if method is not None:
-        plan = plan.changed({"optimizer.method": method})
     result = optimize_plan(plan, observe=observe)
     solution = result.solution
     if observe is not None:

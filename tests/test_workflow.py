@@ -173,9 +173,3 @@ def test_a_row_of_a_study_needs_no_mission(result: Result) -> None:
     assert alone.information == result.information
     assert (alone.conversion, alone.check, alone.findings) == (None, None, ())
     assert alone.as_dict().keys() == result.as_dict().keys()
-
-
-def test_another_method_is_in_the_plan_of_the_result(paper_plan: MakePlan) -> None:
-    result = plan_mission(paper_plan(), method="direct")
-    assert result.solution.plan.optimizer.method == "direct"
-    assert parse_plan(result.solution.plan.text).optimizer.method == "direct"
