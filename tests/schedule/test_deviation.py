@@ -63,12 +63,3 @@ def test_the_distance_to_a_path_is_the_least_to_a_leg(points: np.ndarray, path: 
     legs = list(zip(path, [*path[1:], path[-1]], strict=True))
     expected = np.min([distances_to_segment(points, a, b) for a, b in legs], axis=0)
     assert distances_to_path(points, path) == pytest.approx(expected, abs=1e-6)
-
-
-def test_long_paths_are_compared_in_parts() -> None:
-    t = np.linspace(0, 1, 3001)
-    path = np.column_stack([t, np.sin(20 * t)])
-    assert distances_to_path(path, path).max() < 1e-12
-    assert distances_to_path(path + np.array([0, 1e-4]), path).max() == pytest.approx(
-        1e-4, rel=0.01
-    )

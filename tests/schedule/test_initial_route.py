@@ -162,13 +162,6 @@ def slow(speed: float) -> Plan:
     return plan_with().changed({"vehicle.max_speed": speed, "flight.end": [0, 350]})
 
 
-def test_a_slow_vehicle_flies() -> None:
-    t = np.arange(0, 60, STEP)
-    route = check(t, np.outer(0.8 * t, [0.0, 1.0]), slow(1.0))
-    assert len(route.positions) == 2
-    assert route.waits.sum() == 0
-
-
 def test_a_crawl_below_any_speed_keeps_its_time() -> None:
     t = np.arange(0, 200, STEP)
     w = np.outer(0.05 * t, [0.0, 1.0])
@@ -216,29 +209,12 @@ def test_two_ends_within_one_hover() -> None:
     assert nominal(route) == pytest.approx(t[-1], abs=1)
 
 
-@pytest.mark.parametrize("w", [[[0, 0], [0, 0]], [[0, 0], [0.5, 0]], [[0, 0], [50, 0]]])
-@pytest.mark.parametrize("lasting", [0.2, 20.0])
-def test_two_samples(w: list[list[float]], lasting: float) -> None:
-    check(np.array([0.0, lasting]), np.array(w, dtype=float), plan_with())
-
-
 def test_a_speed_is_rounded_down_at_the_limit() -> None:
     t = np.arange(0, 20, STEP)
     route = initial_route(t, np.outer(7.9999 * t, [1.0, 0.0]), plan_with(max_speed=7.9999))
     assert route.speeds == pytest.approx([7.999], abs=1e-12)
     route = initial_route(t, np.outer(2 * t, [1.0, 0.0]), slow(0.0004))
     assert route.speeds == pytest.approx([0.0004])
-
-
-def test_hovers_stay_in_their_radius() -> None:
-    rng = np.random.default_rng(1)
-    t = STEP * np.arange(2000.0)
-    w = np.cumsum(rng.normal(0, 0.004, (2000, 2)), axis=0)
-    hovers = find_hovers(t, w, 0.5)
-    assert hovers
-    for hover in hovers:
-        assert lengths(w[hover.first : hover.last + 1] - hover.position).max() <= 1.0
-        assert t[hover.last] - t[hover.first] >= 3
 
 
 def test_a_plan_that_dithers_about_a_place_waits_there() -> None:

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -24,7 +23,6 @@ from faao_mav.plan import parse_plan
 from faao_mav.report.style import save_figure
 from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
-from faao_mav.study.rows import ROWS, append_row, as_dict, comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
@@ -190,12 +188,6 @@ def test_the_main_job_takes_no_notice_of_a_study(plan: Path, tmp_path: Path) -> 
     assert written[0] == written[1]
 
 
-def test_a_strange_directory_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "rows.jsonl").write_text('{"not": "a row"}\n')
-    with pytest.raises(InputError, match="line 1: no row of a study"):
-        run_study(CASES, jobs=1, directory=tmp_path)
-
-
 def test_what_is_no_row_is_refused_by_its_line(
     whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path
 ) -> None:
@@ -212,10 +204,21 @@ def test_what_is_no_row_is_refused_by_its_line(
         (tmp_path / "rows.jsonl").write_text(f"{first}\n{edit}\n")
         with pytest.raises(InputError, match=rf"rows\.jsonl: line 2: no row of a study: {said}"):
             run_study(CASES, jobs=1, directory=tmp_path)
-    for line in (b"[" * 100_000, b'{"key": "\xff"}', b"1", b"", b"9" * 5_000_000):
+    for line in (
+        b'{"not": "a row"}',
+        b"[" * 100_000,
+        b'{"key": "\xff"}',
+        b"1",
+        b"",
+        b"9" * 5_000_000,
+    ):
         (tmp_path / "rows.jsonl").write_bytes(line + b"\n")
         with pytest.raises(InputError, match="line 1: no row of a study"):
             load_rows(tmp_path, CASES)
+    (tmp_path / "rows.jsonl").write_text("notes without a line's end")
+    with pytest.raises(InputError, match="its last line is no row of a study"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+    assert (tmp_path / "rows.jsonl").read_text() == "notes without a line's end"
 
 
 def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_path: Path) -> None:
@@ -228,29 +231,6 @@ def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_pat
     assert again.route.tolist() == first.route.tolist()
 
 
-def test_rows_that_name_no_rate_are_of_the_cutoff_rate(tmp_path: Path) -> None:
-    case = CASES[0]
-    row = StudyRow(case.key, dict(case.values), case.scheme, 0, R_avg=1.0, delivered=0.5)
-    append_row(row, tmp_path)
-    earlier = json.loads((tmp_path / ROWS).read_text())
-    del earlier["rate"]
-    (tmp_path / ROWS).write_text(json.dumps(earlier) + "\n")
-    (read,) = load_rows(tmp_path, CASES)
-    assert (read.key, read.rate, read.R_avg) == (row.key, "cutoff", 1.0)
-    assert comparison([row]).startswith("R_avg, bit/s/Hz\n")
-    other = replace(row, rate="mutual_information")
-    assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
-    assert as_dict(other)["rate"] == "mutual_information"
-
-
-def test_text_that_is_no_cut_off_row_is_left_alone(tmp_path: Path) -> None:
-    path = tmp_path / "rows.jsonl"
-    path.write_text("notes without a line's end")
-    with pytest.raises(InputError, match="its last line is no row of a study"):
-        run_study(CASES, jobs=1, directory=tmp_path)
-    assert path.read_text() == "notes without a line's end"
-
-
 def test_what_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="file: is a file; give a directory"):
@@ -259,12 +239,6 @@ def test_what_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> No
     with pytest.raises(InputError, match=r"table\.csv: is a directory"):
         run_study(CASES, jobs=1, directory=tmp_path)
     assert not (tmp_path / "rows.jsonl").exists()
-
-
-def test_a_row_that_cannot_be_kept_is_an_input_error(tmp_path: Path) -> None:
-    (tmp_path / "rows.jsonl").mkdir()
-    with pytest.raises(InputError, match=r"rows\.jsonl: cannot be written"):
-        append_row(StudyRow("k", {}, "faao", 0), tmp_path)
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -287,21 +261,6 @@ def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
     assert path.read_bytes() == kept
     assert run(*arguments, "--jobs", 1).exit_code == 0
     assert timeless(load_rows(path.parent, CASES)) == timeless(whole[1])
-
-
-def test_there_are_no_more_processes_than_cases(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[int] = []
-
-    def undo(work: Iterable[tuple[Any, Any, Any]]) -> list[StudyRow]:
-        return [call(*arguments, **named) for call, arguments, named in work]
-
-    def parallel(n_jobs: int, **_: object) -> Callable[..., list[StudyRow]]:
-        asked.append(n_jobs)
-        return undo
-
-    monkeypatch.setattr("joblib.Parallel", parallel)
-    run_study(CASES, jobs=100_000)
-    assert asked == [len(CASES)]
 
 
 def test_a_key_varied_twice_is_refused(plan: Path) -> None:
