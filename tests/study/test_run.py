@@ -23,6 +23,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.report.style import save_figure
 from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
+from faao_mav.study.rows import comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
@@ -72,6 +73,9 @@ def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[StudyRow, ...]]) 
     assert row.mutual_information == price(solution).average
     assert (row.converged, row.iterations, row.error) == (True, solution.iterations, "")
     assert len(row.route) == len(solution.w)
+    assert comparison([row]).startswith("R_avg, bit/s/Hz\n")
+    other = replace(row, rate="mutual_information")
+    assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
 
 
 def test_a_resumed_study_is_the_uninterrupted_one(
