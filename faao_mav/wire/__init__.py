@@ -2,7 +2,6 @@
 
 from faao_mav.wire.client import LinkOptions as LinkOptions
 from faao_mav.wire.client import UploadReport as UploadReport
-from faao_mav.wire.client import clear as clear
 from faao_mav.wire.client import download as download
 from faao_mav.wire.client import upload as upload
 from faao_mav.wire.protocol import MissionType as MissionType

@@ -1,9 +1,9 @@
-"""What a ground station does: upload and verify, download, clear."""
+"""What a ground station does: upload and verify, download."""
 
 import secrets
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypedDict, Unpack
@@ -15,7 +15,7 @@ from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import SETTLE, FoundVehicle, choose, discover
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Talk
-from faao_mav.wire.messages import GlobalPositionInt, HomePosition
+from faao_mav.wire.messages import GlobalPositionInt, HomePosition, WireItem
 from faao_mav.wire.parameters import Change, check_settable, set_parameters
 from faao_mav.wire.protocol import (
     GROUND_STATION,
@@ -57,7 +57,7 @@ _PASSED_OVER: dict[Verdict, str] = {
 
 
 class LinkOptions(TypedDict, total=False):
-    """How to talk to a vehicle: what `upload`, `download` and `clear` have in common.
+    """How to talk to a vehicle: what `upload` and `download` have in common.
 
     `system` and `component` choose among several autopilots; the vehicle is found by its heartbeat
     within `wait` seconds (10). `own_system` is the number to speak as, for a vehicle that takes
@@ -122,79 +122,59 @@ def upload(
     breaks; `InputError` for what cannot be sent.
     """
     if not mission.items:
-        raise InputError("upload: the mission has no items; clear the vehicle's instead")
+        raise InputError("upload: the mission has no items")
     check_settable(parameters or (), "parameters")
-
-    def job(session: Session) -> Talk[UploadReport]:
-        peer = session.peer
+    with Session(connection, knocks=True, **options) as session:
+        found, peer = session.found, session.peer
+        if found.armed and not allow_armed:
+            raise LinkError(
+                f"{connection}: {found}: the mission of an armed vehicle is not replaced; "
+                "disarm it, or allow it (--allow-armed)"
+            )
         if made_for is not None and peer.vehicle is not None:
             mistake = addressee_mistake(made_for, peer.vehicle)
             if mistake is not None:
                 raise LinkError(f"{connection}: {mistake}: nothing is uploaded")
+        peer.may_be_armed = allow_armed
         lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
-        told = yield from ask_for(peer.address, POSITION, GlobalPositionInt)
-        place = place_in(told) if told else None
-        stands = None if place is None else Whereabouts.of(place, mission)
-        changes, problem = yield from set_parameters(parameters or {}, peer)
-        if problem:
-            return UploadReport(session.found, (), 0.0, (problem,), stands, changes)
-        given = [(part, items) for part, items in lists.items() if items]
-        reports = yield from upload_parts(given, peer)
-        if clear_rest and all(each.verified for each in reports):
-            rest = [part for part, items in lists.items() if not items]
-            cleared = yield from clear_lists(rest, peer)
-            reports += tuple(each for each in cleared if each.result not in ABSENT)
-        return UploadReport(session.found, reports, 0.0, (), stands, changes)
-
-    return _change(connection, mission, allow_armed, job, options)
-
-
-def clear(
-    connection: str,
-    *,
-    types: Sequence[MissionType] = tuple(MissionType),
-    allow_armed: bool = False,
-    **options: Unpack[LinkOptions],
-) -> UploadReport:
-    """Clear lists of the vehicle at `connection` and read back that they are empty.
-
-    Arguments and errors as in `upload`.
-    """
-
-    def job(session: Session) -> Talk[UploadReport]:
-        reports = yield from clear_lists(types, session.peer)
-        return UploadReport(session.found, reports, 0.0, ())
-
-    return _change(connection, Mission(()), allow_armed, job, options)
-
-
-def _change(
-    connection: str,
-    mission: Mission,
-    allow_armed: bool,
-    job: "Callable[[Session], Talk[UploadReport]]",
-    options: LinkOptions,
-) -> UploadReport:
-    """Run `job`, after which the vehicle is to hold `mission`, and report what became of it."""
-    with Session(connection, knocks=True, **options) as session:
-        if session.found.armed and not allow_armed:
-            raise LinkError(
-                f"{connection}: {session.found}: the mission of an armed vehicle is not replaced; "
-                "disarm it, or allow it (--allow-armed)"
-            )
-        session.peer.may_be_armed = allow_armed
         try:
-            report = session.run(job(session))
+            told, changes, problem, parts = session.run(
+                _put(lists, parameters or {}, peer, clear_rest)
+            )
         except LinkError as error:
-            raise LinkError(f"{error}. {what_is_left(session.peer)}") from None
-        problems = [*report.problems]
-        for part in report.parts:
+            raise LinkError(f"{error}. {what_is_left(peer)}") from None
+        problems = [problem] if problem else []
+        for part in parts:
             if not part.verified:
                 unheard = part.verdict == "silent" and part.item is None
                 why = session.why_silent() if unheard else ""
-                problems.append(explain(part, session.peer, mission) + why)
+                problems.append(explain(part, peer, mission) + why)
         seconds = time.monotonic() - session.started
-    return replace(report, seconds=seconds, problems=tuple(problems))
+    place = place_in(told) if told else None
+    stands = None if place is None else Whereabouts.of(place, mission)
+    return UploadReport(found, parts, seconds, tuple(problems), stands, changes)
+
+
+def _put(
+    lists: Mapping[MissionType, tuple[WireItem, ...]],
+    parameters: Mapping[str, float],
+    peer: Peer,
+    clear_rest: bool,
+) -> Talk[tuple[GlobalPositionInt | None, tuple[Change, ...], str, tuple[PartReport, ...]]]:
+    """Set `parameters`, then upload `lists`, and clear those that are empty if asked to.
+
+    Return where the vehicle is, the changes of parameters and in words what went wrong with them,
+    and what became of the lists.
+    """
+    told = yield from ask_for(peer.address, POSITION, GlobalPositionInt)
+    changes, problem = yield from set_parameters(parameters, peer)
+    if problem:
+        return told, changes, problem, ()
+    reports = yield from upload_parts([each for each in lists.items() if each[1]], peer)
+    if clear_rest and all(each.verified for each in reports):
+        cleared = yield from clear_lists([part for part in lists if not lists[part]], peer)
+        reports += tuple(each for each in cleared if each.result not in ABSENT)
+    return told, changes, problem, reports
 
 
 @dataclass(frozen=True, slots=True)

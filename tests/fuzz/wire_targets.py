@@ -113,7 +113,7 @@ def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
     yield Script(upload_parts(lists, peer))
     yield Script(download_lists(tuple(MissionType), peer))
     yield Script(_asks(peer))
-    yield Script(clear_lists(tuple(MissionType), peer))
+    yield Script(clear_lists((MissionType.FENCE, MissionType.RALLY), peer))
 
 
 def _asks(peer: Peer) -> Talk[list[object]]:

@@ -17,7 +17,7 @@ from stations import FENCE, RALLY, a_mission, signing_key
 from faao_mav.errors import LinkError
 from faao_mav.mission import MissionItem
 from faao_mav.sim.faults import Faults, FaultyTransport
-from faao_mav.wire import clear, download, link, upload
+from faao_mav.wire import download, link, upload
 from faao_mav.wire.transport import open_transport
 
 MISSION = a_mission(6, fence=FENCE, rally=RALLY)
@@ -59,7 +59,10 @@ def test_everything_is_stored_read_back_and_cleared(
     found = download(vehicle, wait=PATIENCE)
     assert (found.fence, found.rally) == (MISSION.fence, MISSION.rally)
     assert [places(item) for item in found.items] == [places(item) for item in MISSION.items]
-    assert clear(vehicle, wait=PATIENCE).problems == ()
+    bare = a_mission(3)
+    assert upload(bare, vehicle, wait=PATIENCE, clear_rest=True).problems == ()
+    found = download(vehicle, wait=PATIENCE)
+    assert (found.fence, found.rally) == (bare.fence, bare.rally)
 
 
 @pytest.mark.parametrize("kind", KINDS)

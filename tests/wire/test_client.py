@@ -19,7 +19,7 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.mission import Mission
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
-from faao_mav.wire import Timeouts, clear, download, upload
+from faao_mav.wire import Timeouts, download, upload
 from faao_mav.wire.protocol import Address, MissionType
 from faao_mav.wire.transport import open_transport, parse_connection
 from faao_mav.wire.wire_items import wire_items
@@ -68,10 +68,9 @@ def test_all_three_lists(kind: MockKind, port: int) -> None:
         kept = upload(a_mission(4), connection, system=1)
         assert [part.part for part in kept.parts] == [MISSION]
         assert mock.mission().rally == RALLY
-        assert clear(connection, system=1, types=[MissionType.RALLY]).verified
+        rest = upload(a_mission(5, fence=FENCE), connection, system=1, clear_rest=True)
+        assert [part.part for part in rest.parts] == list(MissionType)
         assert (mock.mission().rally, mock.mission().fence) == ((), FENCE)
-        assert clear(connection, system=1).verified
-        assert mock.mission().items == ()
 
 
 @pytest.mark.parametrize(
@@ -95,10 +94,8 @@ def test_the_mission_of_an_armed_vehicle_is_left_alone(port: int) -> None:
     connection = f"udpout:127.0.0.1:{port}"
     with running(mock_of("px4"), f"udpin:127.0.0.1:{port}") as mock:
         mock.flight.arm(0.0)
-        changes = (upload, a_mission(5), connection), (clear, connection)
-        for change, *arguments in changes:
-            with pytest.raises(LinkError, match="armed vehicle is not replaced; disarm it"):
-                change(*arguments, system=1)
+        with pytest.raises(LinkError, match="armed vehicle is not replaced; disarm it"):
+            upload(a_mission(5), connection, system=1)
         assert mock.mission().items == ()
         assert upload(a_mission(5), connection, system=1, allow_armed=True).verified
 
@@ -149,7 +146,7 @@ def test_no_vehicle(port: int) -> None:
 
 
 def test_an_empty_mission_is_not_uploaded() -> None:
-    with pytest.raises(InputError, match="no items; clear the vehicle's instead"):
+    with pytest.raises(InputError, match="the mission has no items"):
         upload(Mission(()), "udpout:127.0.0.1:9")
 
 

@@ -100,7 +100,7 @@ def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk["Lists"]:
 
 
 def clear_lists(types: Sequence[MissionType], peer: Peer) -> Talk[tuple[PartReport, ...]]:
-    """Clear the lists of `types`, and read back that they are empty (but for the home item)."""
+    """Clear the lists of `types`, fence or rally points, and read back that they are empty."""
     reports = []
     for part in types:
         cleared = yield from clear_list(peer, part)
@@ -108,8 +108,7 @@ def clear_lists(types: Sequence[MissionType], peer: Peer) -> Talk[tuple[PartRepo
         if cleared.status in ("accepted", "silent"):
             read = yield from read_list(peer, part)
             if read.status == "accepted":
-                home = read.items[: home_items(peer.vehicle, part)]
-                differences = compare(home, read.items, part, peer.vehicle)
+                differences = compare((), read.items, part, peer.vehicle)
                 verdict: Verdict = "different" if differences else "verified"
                 report = replace(report, verdict=verdict, differences=differences)
         reports.append(report)
