@@ -7,7 +7,7 @@ from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.sim.mock_autopilot import MockAutopilot
 from faao_mav.wire.link import WireLink
 from faao_mav.wire.signing import Signing
-from faao_mav.wire.transport import Transport, open_transport
+from faao_mav.wire.transport import Transport
 
 _PATIENCE = 0.1
 """Seconds between two looks at whether to stop."""
@@ -15,18 +15,14 @@ _PATIENCE = 0.1
 
 def serve(
     mock: MockAutopilot,
-    connection: str | Transport,
+    transport: Transport,
     *,
     faults: Faults | None = None,
     key: bytes | None = None,
     stop: Callable[[], bool] = lambda: False,
     observe: Callable[[MockAutopilot], object] | None = None,
 ) -> None:
-    """Run `mock` at `connection` until `stop()`; `observe` is shown it after every step.
-
-    Raises `LinkError` or `InputError` if the connection cannot be opened.
-    """
-    transport = open_transport(connection) if isinstance(connection, str) else connection
+    """Run `mock` on `transport` until `stop()`; `observe` is shown it after every step."""
     if faults is not None:
         transport = FaultyTransport(transport, faults)
     signing = None if key is None else Signing(key)

@@ -52,12 +52,12 @@ class Tlog:
     the pen must not replace the mission.
     """
 
-    def __init__(self, path: Path, clock: Callable[[], float] = time.time) -> None:
+    def __init__(self, path: Path) -> None:
         if path.suffix != ".tlog":
             raise InputError(f"--log {path}: give a name that ends in .tlog")
         check_writable(path)
         self.failure: str | None = None
-        self._path, self._clock = path, clock
+        self._path = path
         self._file: FileIO | None = None
         self._waiting = b""
 
@@ -65,7 +65,7 @@ class Tlog:
         """Append `packet`, sent or received now."""
         if self.failure is not None or message_id(packet) == _SETUP_SIGNING:
             return
-        self._waiting += struct.pack(">Q", int(self._clock() * 1e6)) + packet
+        self._waiting += struct.pack(">Q", int(time.time() * 1e6)) + packet
         try:
             if received and self._file is None:
                 self._file = FileIO(self._path, "w", opener=_open_for_owner)
