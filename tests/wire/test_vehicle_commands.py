@@ -24,6 +24,7 @@ from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import Timeouts
 from faao_mav.wire.messages import Envelope, MissionRequestList
 from faao_mav.wire.protocol import MavResult, MissionType
+from faao_mav.wire.transport import Transport
 from faao_mav.wire.wire_items import wire_items
 
 app = typer.Typer(pretty_exceptions_enable=False)
@@ -137,8 +138,8 @@ def test_the_mock_autopilot_as_a_command(
     ended = threading.Event()
     serve = serving.serve
 
-    def until_ended(mock: MockAutopilot, connection: str, **options: Any) -> None:
-        serve(mock, connection, **options, stop=ended.is_set)
+    def until_ended(mock: MockAutopilot, transport: Transport, **options: Any) -> None:
+        serve(mock, transport, **options, stop=ended.is_set)
         raise KeyboardInterrupt
 
     monkeypatch.setattr(serving, "serve", until_ended)
