@@ -7,7 +7,6 @@ from typing import Unpack
 from faao_mav.errors import LinkError
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, read_held
-from faao_mav.fly.start import Start
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import POSITION_RATE, Ending
 from faao_mav.fly.watch import Watch
@@ -83,13 +82,12 @@ def fly_mission(
         rows = held.lists[MissionType.MISSION]
         if flight.streamed and flight.solution is not None:
             watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
-        elif arm:
-            watch = Start(peer, rows, ready, lands=lands, rate=rate)
         else:
-            watch = Watch(peer, rows, ready if judged else None, lands=lands, rate=rate)
+            gate = ready if judged else None
+            watch = Watch(peer, rows, gate, arm=arm, lands=lands, rate=rate)
         watch.seen.strangers = session.strangers
         try:
-            beats = isinstance(watch, Start)
+            beats = arm or watch.streams
             ending = session.watch(watch, lambda: watching(watch), beats=beats)
         except LinkError as error:
             ending = Ending("lost", str(error))

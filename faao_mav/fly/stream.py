@@ -10,10 +10,11 @@ from faao_mav.errors import InputError
 from faao_mav.fly.course import Setpoint, at_rest
 from faao_mav.fly.gate import LEVEL, Gate
 from faao_mav.fly.itinerary import Itinerary
+from faao_mav.fly.order import ACCEPTED, Order
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.readiness import Readiness
-from faao_mav.fly.start import ACCEPTED, Order, Start
 from faao_mav.fly.telemetry import PATIENCE
+from faao_mav.fly.watch import Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.wire.messages import (
@@ -48,7 +49,7 @@ Chosen."""
 _FAILSAFE = "it is in its failsafe, until setpoints come again"
 
 
-class Stream(Start):
+class Stream(Watch):
     """A watch that arms the vehicle of `peer`, and flies `solution` by setpoints.
 
     `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
@@ -73,13 +74,13 @@ class Stream(Start):
     ) -> None:
         plan = solution.plan
         finish = plan.mission.on_finish
-        super().__init__(peer, (), readiness, lands=finish != "hover", rate=rate)
+        super().__init__(peer, (), readiness, arm=True, lands=finish != "hover", rate=rate)
         if self._modes.guided is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._guided, self._rules = self._modes.guided, self._family.setpoints
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if self._lands else "hold"]
-        self._solution = solution
+        self._solution, self._readiness = solution, readiness
         self._height, self._top = plan.flight.altitude, plan.max_ground_speed
         self._period = 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2

@@ -1,14 +1,23 @@
-"""Watching a mission from the ground to its end."""
+"""Watching a flight from the ground to its end; arming and starting it, where that is asked for."""
 
+import math
 from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
+from faao_mav.fly.order import ACCEPTED, IN_PROGRESS, TRIES, Order
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.machine import Machine, Progress
-from faao_mav.wire.messages import Envelope, Heartbeat, Message, MissionCurrent, WireItem
-from faao_mav.wire.protocol import MISSION_COMPLETE
+from faao_mav.wire.messages import (
+    CommandAck,
+    Envelope,
+    Heartbeat,
+    Message,
+    MissionCurrent,
+    WireItem,
+)
+from faao_mav.wire.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, command_result
 from faao_mav.wire.transfer.exchange import Peer
 
 Phase: TypeAlias = Literal[
@@ -27,17 +36,35 @@ was the mission that changed it. Chosen: three of the messages that tell the ite
 _FIRST_DO = 176
 """From this command on an item is no place to fly to or to wait at."""
 
+_LISTEN = 2.0
+"""Seconds of listening for other ground stations before anything is started: two heartbeats."""
+
+_WORDS = 1.0
+"""Seconds for which what the vehicle says of an arming that it denies is waited for; chosen."""
+
 
 class Watch(Machine[Ending]):
     """A machine that watches the vehicle of `peer` fly the mission `rows` to its end.
 
     `rows` are the items that it holds, the home row included where it has one. `lands`: the flight
     ends on the ground. After `PATIENCE` seconds without a message it ends. `seen` is what it has
-    heard; it asks for `rate` positions a second. Nothing else is sent: somebody else arms and
-    starts it. What stands against that, `readiness` says meanwhile, where it is given.
+    heard; it asks for `rate` positions a second. What stands against the flight `readiness`, the
+    gate before it, says until it begins; a flight that begins elsewhere may be without.
 
-    The phases: "waiting" for others to start it; "flying" the mission; "ending", when that is over;
-    "aside", when somebody else has the aircraft. Those between are of a `Start`.
+    With `arm` it arms the vehicle and starts the mission: once the autopilot's own checks pass, it
+    knows where it is, no other ground station was heard and the gate finds no error. After
+    `PATIENCE` seconds of checks that do not pass it ends. Nothing is ever sent again, but what asks
+    for telemetry, once the mode is one that was not asked for: then the pilot, or a failsafe, has
+    the aircraft. Without `arm` nothing else is sent at all.
+
+    `cancel` asks a flight that was started here to hold, and again until it does or a pilot has it,
+    however long the link is silent; a second time it leaves it, as any other flight. `hang_up`
+    leaves a mission to the autopilot. What was armed, and did not start, is asked to disarm until
+    it has.
+
+    The phases: "waiting" for others to start it, or "checking", "engaging" (a `Stream` only),
+    "arming" and "starting", or "disarming"; "flying"; "ending", when the mission is over;
+    "holding", as `cancel` asked for; "aside", when somebody else has the aircraft.
     """
 
     streams = False
@@ -49,6 +76,7 @@ class Watch(Machine[Ending]):
         rows: Sequence[WireItem],
         readiness: Readiness | None = None,
         *,
+        arm: bool = False,
         lands: bool = True,
         rate: float = POSITION_RATE,
     ) -> None:
@@ -57,13 +85,22 @@ class Watch(Machine[Ending]):
         self._peer, self._modes, self._family = peer, peer.vehicle.modes, peer.vehicle.family
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
-        self._lands, self._ready = lands, readiness
+        self._arms, self._lands, self._ready = arm, lands, readiness
         self.seen = Telemetry(peer, rows, rate)
         self.phase: Phase = "waiting"
+        if arm:
+            self.seen.ask_for(LOCAL_POSITION, 1.0)
+            self.phase = "checking"
         self.relay_start: float | None = None
         """When the plan's clock read 0, s on the vehicle's, where that is known."""
         self._furthest, self._armed = 0, False
-        self._aside_since, self._disarmed_at = float("-inf"), float("inf")
+        self._aside_since, self._disarmed_at = -math.inf, math.inf
+        self._order: Order | None = None
+        self._asked: set[int | None] = set()
+        """Modes in which it may be meanwhile: any other was set by somebody else."""
+        self._before = -1
+        self._begun, self._said_before, self._unattended = 0.0, 0, False
+        self._then = Ending("refused", "")
 
     @property
     def findings(self) -> tuple[Finding, ...] | None:
@@ -77,19 +114,37 @@ class Watch(Machine[Ending]):
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen, and ask for telemetry."""
+        self._begun = now
         self.seen.start(now)
         if self._ready is not None:
             self._ready.begun = now
         return self._time_out(now)
 
     def cancel(self, now: float) -> Sequence[Message]:
-        """Leave the flight, and say how."""
+        """Ask the flight to hold, or leave it, and say how: what has been asked for is told."""
+        asked = self._order is not None
+        begun = self._arms and self.phase in ("starting", "flying")
+        if begun or (self.phase == "ending" and asked):
+            return self._ask_to_hold(now)
+        if self.phase == "arming":
+            return self._disarm(Ending("left", "interrupted before the start"), now)
+        if self.phase == "disarming":
+            self._leave_armed("interrupted again")
         armed = "armed" if self._armed else "not armed"
-        self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}")
-        return ()
+        doubt = ", and has not confirmed that it holds" if self.phase == "holding" and asked else ""
+        self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}{doubt}")
+        return () if self._ready is None else self._ready.cancel(now)
 
-    def hang_up(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """Leave the flight to the autopilot."""
+    def hang_up(self, now: float) -> Sequence[Message]:
+        """Leave a mission that is under way to the autopilot, cancel anything else.
+
+        A flight by setpoints is to hold: it needs this end. What is not confirmed is waited for.
+        """
+        self._unattended = True
+        if self._order is not None and self.phase in ("holding", "ending", "disarming"):
+            return ()
+        if self.streams or self.phase in ("arming", "starting"):
+            return self.cancel(now)
         self._end("left", f"the terminal has gone; the vehicle goes on in mode {self.seen.mode}")
         return ()
 
@@ -103,10 +158,18 @@ class Watch(Machine[Ending]):
 
     def _hear(self, message: Message, now: float) -> Sequence[Message]:
         """Take note of what the vehicle tells."""
+        order = self._order
         match message:
+            case CommandAck(target, command, result) if self._peer.own.takes(target):
+                if order is not None and command == order.command and result != IN_PROGRESS:
+                    return self._answered(order, result, now)
             case Heartbeat(armed=armed, custom_mode=mode):
+                disarms = self.phase == "disarming" and order is not None and not armed
+                # A first heartbeat may be from before the order.
+                if disarms and order is not None and (self._armed or order.sent > 1):
+                    self._end(self._then.kind, f"{self._then.text}; it is disarmed{self._words}")
                 if self._armed != armed:
-                    self._disarmed_at = float("inf") if armed else now
+                    self._disarmed_at = math.inf if armed else now
                 self._armed = armed
                 return self._on_mode(mode, now)
             case MissionCurrent():
@@ -117,11 +180,18 @@ class Watch(Machine[Ending]):
         self._due = now + _TICK
         out = [*self.seen.tick(now), *self._end_as_heard(now)]
         if now >= self._disarmed_at + _REBOOT:
-            self._disarmed_at = float("inf")
+            self._disarmed_at = math.inf
             self._on_disarmed()
+        over = self.phase in ("holding", "ending", "aside") and self._order is None
+        if self._unattended and over:
+            self._end("left", f"the terminal has gone; the vehicle is in mode {self.seen.mode}")
+        if self.outcome is not None:
+            return out
         if self._ready is not None and self.phase == "waiting" and not self._armed:
             self._ready.judge(self.seen, now)
-        return out
+        return [*out, *(self._check(now) if self.phase == "checking" else self._repeat(now))]
+
+    # ---- what the vehicle does
 
     def _on_current(self, current: MissionCurrent, now: float) -> None:
         if self.phase in ("flying", "holding", "ending"):
@@ -135,22 +205,53 @@ class Watch(Machine[Ending]):
             self._over()
 
     def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
+        ordered = self.phase in ("arming", "starting", "disarming", "holding")
         match self.phase:
-            case "waiting" if self._armed and mode == self._modes.mission:
+            case _ if ordered and mode not in self._asked:
+                self._step_aside()
+            case "waiting" | "starting" if self._armed and mode == self._modes.mission:
                 self._begin()
             case "flying" if mode != self._modes.mission and self._furthest >= self._last:
                 self._over()  # the last item has a mode of its own, as PX4's return
             case "flying" if mode != self._modes.mission:
                 self._aside_since = now
                 self._step_aside()
+            case "holding" if mode != self._before and self._order is not None:
+                self._asked.discard(self._before)  # the start that was asked for has come
+                if mode == self._modes.hold:
+                    self._order, self._asked, self.seen.patience = None, {mode}, PATIENCE
+                    self.seen.told.append("it holds; interrupt again to leave it")
+        return ()
+
+    def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
+        """Go on, or end, now that an order is answered.
+
+        Arming that is denied is not asked for again: what is said about it is waited for.
+        """
+        order.answer = f"answers {order.command.name} with {command_result(result)}"
+        accepted = result == ACCEPTED
+        order.refusals += not accepted
+        match self.phase:
+            case "arming" if accepted:
+                return self._start(now)
+            case "arming":
+                order.sent, order.due = TRIES, now + _WORDS
+            case "starting" if not accepted:
+                return self._refused(order, now)
+            case "disarming" if order.refusals == TRIES:
+                self._leave_armed(f"it {order.answer}")
         return ()
 
     def _begin(self) -> None:
-        self.phase = "flying"
+        self.phase, self._order = "flying", None
         self.seen.told.append("the mission is under way")
 
     def _on_disarmed(self) -> None:
         match self.phase:
+            case "arming" | "starting":
+                self._end("refused", f"the vehicle disarmed before the mission began{self._words}")
+            case "holding":
+                self._end("held", "disarmed after it was asked to hold")
             case "flying" if self._furthest < self._last:
                 text = f"disarmed at item {self.seen.row}, before the end of the mission"
                 self._end("taken over", text)
@@ -167,13 +268,132 @@ class Watch(Machine[Ending]):
 
     def _step_aside(self) -> None:
         """Send nothing more."""
-        self.phase, self.seen.patience = "aside", PATIENCE
+        if self.phase == "disarming":
+            self._leave_armed(f"the pilot or a failsafe has it, in mode {self.seen.mode}")
+        self.phase, self._order, self.seen.patience = "aside", None, PATIENCE
         who = "the pilot or a failsafe has the aircraft; nothing more is sent"
         self.seen.told.append(f"mode {self.seen.mode}: {who}")
 
-    def _end_as_heard(self, now: float) -> Sequence[Message]:  # noqa: ARG002
-        """End where what was heard says so."""
-        self.outcome = self.seen.ending
+    # ---- what it is told
+
+    def _check(self, now: float) -> Sequence[Message]:
+        """Arm, if there is nothing against it."""
+        seen, ready, waited = self.seen, self._ready, now - self._begun
+        assert ready is not None
+        ready.judge(seen, now)
+        if self._stopped(ready):
+            return ()
+        lacks = self._lacks(now)
+        if waited >= PATIENCE:
+            said = "; ".join(dict.fromkeys(seen.said)) or lacks or "it does not say why"
+            self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
+            return ()
+        may_arm = seen.status is not None and seen.status.may_arm and seen.current is not None
+        if waited < _LISTEN or lacks or not may_arm:
+            return ()
+        out = ready.settle(seen, now)
+        if out is not None:
+            return out
+        return () if self._stopped(ready) or ready.errors else self._set_out(now)
+
+    def _lacks(self, now: float) -> str:  # noqa: ARG002
+        """Return what it does not know that it has to, in words."""
+        return "" if self.seen.knows_place else "it does not know where it is"
+
+    def _stopped(self, ready: Readiness) -> bool:
+        """End where the gate has found an error, and tell whether it has.
+
+        A place that is not known is waited for.
+        """
+        errors = [each for each in ready.errors if each.rule != "position-unknown"]
+        if errors:
+            contested = any(each.rule == "ground-station" for each in errors)
+            told = "; ".join(f"{each.message} ({each.action})" for each in errors)
+            self._end("contested" if contested else "refused", f"nothing was started: {told}")
+        return bool(errors)
+
+    def _set_out(self, now: float) -> Sequence[Message]:
+        """Arm, now that nothing is against it."""
+        self.seen.told.append(f"its own checks pass: arming, and starting {self.seen.items} items")
+        return self._arm(self.seen.custom_mode, now)
+
+    def _arm(self, mode: int, now: float) -> Sequence[Message]:
+        self.phase, self._before, self._asked = "arming", mode, {mode}
+        return self._say(now, MavCommand.ARM, 1.0)
+
+    def _start(self, now: float) -> Sequence[Message]:
+        self.phase = "starting"
+        self._asked.add(self._modes.mission)
+        return self._say(now, MavCommand.START)
+
+    def _ask_to_hold(self, now: float) -> Sequence[Message]:
+        """Ask the vehicle to hold, until it does."""
+        if self.phase != "starting" or self.streams:
+            self._before = -1
+        self._asked = {self._before, self._modes.mission, self._modes.hold}
+        self.phase, self.seen.patience = "holding", math.inf
+        self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
+        return self._set_mode(now, self._modes.hold)
+
+    def _set_mode(self, now: float, mode: int) -> Sequence[Message]:
+        return self._say(now, MavCommand.SET_MODE, *self._family.mode_parameters(mode))
+
+    def _say(self, now: float, command: MavCommand, *params: float) -> Sequence[Message]:
+        """Give an order, and repeat it until it is answered."""
+        self._order = Order(command, params, now)
+        if self.phase != "disarming":
+            self._said_before = len(self.seen.said)
+        return self._repeat(now)
+
+    def _repeat(self, now: float) -> Sequence[Message]:
+        order = self._order
+        if order is None or now < order.due:
+            return ()
+        if order.sent == TRIES and self.phase == "holding":
+            text = f"it does not confirm that it holds, it {order.answer}: it is asked again"
+            self.seen.told.append(f"{text} until then")
+        if order.sent >= TRIES and self.phase in ("engaging", "arming", "starting"):
+            return self._refused(order, now)
+        return [order.given(self._peer.address, now)]
+
+    # ---- how it ends
+
+    def _refused(self, order: Order, now: float) -> Sequence[Message]:
+        """End before the start; an aircraft that is armed, or may be, disarms first."""
+        then = Ending("refused", f"the vehicle {order.answer}")
+        unsure = self.phase == "arming" and not order.refusals
+        if unsure or self._armed or self.phase == "starting":
+            return self._disarm(then, now)
+        self._end(then.kind, f"{then.text}{self._words}")
+        return ()
+
+    @property
+    def _words(self) -> str:
+        """What it has said since the last order, as the end of a sentence."""
+        said = dict.fromkeys(self.seen.said[self._said_before :])
+        return f". It says: {'; '.join(said)}" if said else ""
+
+    def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
+        """Have it disarm, and end with `then`."""
+        self.phase, self._then = "disarming", then
+        self._asked = {self.seen.custom_mode, self._modes.mission, self._modes.guided}
+        self.seen.told.append(f"{then.text}: it is asked to disarm")
+        return self._say(now, MavCommand.ARM, 0.0)
+
+    def _leave_armed(self, why: str) -> None:
+        """End, though it may still be armed."""
+        text = f"{self._then.text}; it may still be armed: {why}{self._words}"
+        self._end(self._then.kind, text)
+
+    def _end_as_heard(self, now: float) -> Sequence[Message]:
+        """End where what was heard says so; what may be armed is disarmed whatever that is."""
+        ending = self.seen.ending
+        if ending is not None and ending.kind == "changed" and self.phase in ("arming", "starting"):
+            return self._disarm(ending, now)
+        if self.phase != "disarming":
+            self.outcome = ending
+        elif ending is not None and ending.kind == "lost":
+            self._leave_armed(f"nothing was heard for {self.seen.patience:.0f} s")
         return ()
 
     def _end(self, kind: Kind, text: str) -> None:

@@ -16,7 +16,6 @@ from faao_mav.arrays import Real
 from faao_mav.fly.gate import LEVEL, NEAR
 from faao_mav.fly.readiness import Readiness
 from faao_mav.fly.seen import Flight, Held
-from faao_mav.fly.start import Start
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.watch import Watch
 from faao_mav.geodesy import LocalFrame
@@ -159,7 +158,7 @@ class Scene:
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
         held = held_by(self.mock, untold)
         ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
-        self.watch: Any = (Start if self.arm else Watch)(peer, rows, ready, lands=lands)
+        self.watch: Any = Watch(peer, rows, ready, arm=self.arm, lands=lands)
         if solution is not None:
             self.watch = Stream(peer, solution, ready)
         self.client = Counted(self.watch)
