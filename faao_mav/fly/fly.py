@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Unpack
 
 from faao_mav.errors import LinkError
-from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.seen import Flight, read_held
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import POSITION_RATE, Ending

@@ -1,24 +1,28 @@
 """The gate before a flight: what is to be flown against what is held and seen of the vehicle.
 
-Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints.
+Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints. A
+`Readiness` is that of one flight while its vehicle is watched.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib.resources import files
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import addressee_mistake
 from faao_mav.autopilot.manners import FenceAction
-from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.seen import Flight, Held, read_held
 from faao_mav.fly.telemetry import Telemetry
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.words import counted
+from faao_mav.wire.machine import Script
+from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.parameters import number_in
 from faao_mav.wire.protocol import MissionType
+from faao_mav.wire.transfer.exchange import Peer
 from faao_mav.wire.whereabouts import (
     FIRST_AWAY,
     FIRST_FARTHEST,
@@ -33,6 +37,10 @@ from faao_mav.wire.wire_items import wire_items
 LEAST_BATTERY = 30
 """Percent of the battery with which a flight begins at least, where nothing tells what it takes.
 Chosen: twice what PX4 takes for low by default."""
+
+_LOOK = 5.0
+"""Seconds after which it is told what stands against a flight, though its place is not known.
+Chosen."""
 
 _AT_FENCE: dict[FenceAction, str] = {
     "nothing": "flies on",
@@ -246,3 +254,65 @@ def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Ite
     height = own.vertical.return_height
     if height > 0 and "return_height" in own.type.parameters:
         yield _found("on-return", height=height, name=own.name_of("return_height"))
+
+
+class Readiness:
+    """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
+
+    For what is `allowed` see `preflight`. `findings` is what it found last, None before; `begun` is
+    when the vehicle was first heard, s. `judge` looks now and then; before it is armed `settle`
+    reads it again, while `on` is given what arrives.
+    """
+
+    def __init__(self, flight: Flight, held: Held, peer: Peer, **allowed: bool) -> None:
+        self._flight, self._held, self._peer = flight, held, peer
+        self._allowed = allowed
+        self.findings: tuple[Finding, ...] | None = None
+        self._judged: tuple[object, ...] = ()
+        self._reading: Script[Held] | None = None
+        self.begun = 0.0
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Those of `findings` for which nothing is armed."""
+        return tuple(each for each in self.findings or () if each.level is Level.ERROR)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The vehicle's parameters that a flight depends on, by name."""
+        return self._held.reading.values
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        """Take note of what the vehicle says, and answer it."""
+        return () if self._reading is None else self._reading.on(envelope, now)
+
+    def judge(self, seen: Telemetry, now: float, *, again: bool = False) -> None:
+        """Judge what is heard, once enough is, and `again` or when that is another state."""
+        known = seen.place is not None and seen.status is not None
+        if seen.heartbeat is None or not (known or now >= self.begun + _LOOK):
+            return
+        others = len(seen.stations), len(seen.strangers)
+        state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
+        if again or state != self._judged:
+            self._judged = state
+            self.findings = preflight(self._flight, self._held, seen, **self._allowed)
+
+    def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
+        """Return what is to be sent until the gate is up to date; None: `findings` is.
+
+        What it holds is read again; without fresh news of the vehicle it waits.
+        """
+        if self._reading is None:
+            self._reading = Script(read_held(self._peer))
+            return self._reading.start(now)
+        if self._reading.outcome is None:
+            return self._reading.tick(now)
+        if not seen.is_fresh(now):
+            return ()
+        self._held = self._reading.outcome
+        self.judge(seen, now, again=True)
+        return None
+
+    def cancel(self, now: float) -> Sequence[Message]:
+        """Read no more."""
+        return () if self._reading is None else self._reading.cancel(now)

@@ -12,7 +12,7 @@ from faao_mav.fly.gate import LEVEL, Gate
 from faao_mav.fly.itinerary import Itinerary
 from faao_mav.fly.order import ACCEPTED, Order
 from faao_mav.fly.own import OwnClock, OwnFrame
-from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.telemetry import PATIENCE
 from faao_mav.fly.watch import Watch
 from faao_mav.optimizer.solution import Solution

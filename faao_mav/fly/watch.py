@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Literal, TypeAlias
 
 from faao_mav.fly.order import ACCEPTED, IN_PROGRESS, TRIES, Order
-from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.machine import Machine, Progress

@@ -14,7 +14,7 @@ from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicl
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
 from faao_mav.fly.gate import LEVEL, NEAR
-from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.seen import Flight, Held
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.watch import Watch

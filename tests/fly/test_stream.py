@@ -15,7 +15,7 @@ from stations import a_mission, peer_of, vehicle_of
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.fly.own import OwnClock
-from faao_mav.fly.readiness import Readiness
+from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.seen import Flight, Held
 from faao_mav.fly.stream import Stream
 from faao_mav.geodesy import LocalFrame
