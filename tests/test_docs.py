@@ -197,7 +197,7 @@ def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
 def test_the_keys_of_json_and_save_are_listed(folder: Path) -> None:
     run = "missions/paper_active.yaml --method direct --save flight.npz --json"
     done = CliRunner().invoke(app, run.split())
-    first = re.findall(r"^\| (`.*?) \|", PAGES["docs/commands.md"], re.MULTILINE)
+    first = re.findall(r"^(?:\| |- )(`.*?)(?: \||: )", PAGES["docs/commands.md"], re.M | re.S)
     listed = set(re.findall(r"`(\w+)`", " ".join(first)))
     with np.load(folder / "flight.npz") as archive:
         assert sorted({*json.loads(done.stdout), *archive} - listed) == []

@@ -1,6 +1,7 @@
 """What radios are told in flight: the slot that is due, by time or by place, once."""
 
 import json
+import runpy
 import socket
 import threading
 from dataclasses import replace
@@ -12,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import FLYABLE, edited, free_port
-from pages import blocks
 from typer.testing import CliRunner
 
 from faao_mav import optimize, parse_plan
@@ -81,11 +81,9 @@ def test_radios_that_cannot_be_told() -> None:
             Radios(solution, to)
 
 
-def test_the_receiver_of_the_page_receives() -> None:
+def test_the_receiver_of_the_examples_receives() -> None:
     solution, port = solved("none"), free_port()
-    text = next(each.text for each in blocks("docs/flying.md") if "def slots" in each.text)
-    scope: dict[str, Any] = {}
-    exec(text, scope)
+    scope = runpy.run_path("docs/examples/radio_receiver.py")
     done = threading.Event()
 
     def tell() -> None:
