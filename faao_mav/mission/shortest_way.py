@@ -41,9 +41,9 @@ def shortest_way(area: BaseGeometry, start: Real, end: Real) -> Real | None:
         here = nodes[node]
         total = length[node] + np.hypot(*(nodes - here).T)
         near = ~done & (total < length)
-        near[:last] &= _passes(here, before, corners, after)
+        near[:last] &= _touches(here, corners, before, after)
         if node < last:
-            near &= _touches(nodes, before[node], here, after[node])
+            near &= _touches(here, nodes, before[node], after[node])
         near[last] = total[last] < length[last]
         seen = np.flatnonzero(near)
         ends = nodes[seen]
@@ -82,11 +82,6 @@ def _side(a: Real, b: Real, c: Real) -> Real:
     return np.asarray(ab[..., 0] * ac[..., 1] - ab[..., 1] * ac[..., 0])
 
 
-def _passes(here: Real, before: Real, corners: Real, after: Real) -> Flags:
-    """Return at which `corners` (m, 2) a straight from `here` touches the edge, (m,)."""
-    return np.asarray(_side(here, corners, before) * _side(here, corners, after) >= 0)
-
-
-def _touches(there: Real, before: Real, corner: Real, after: Real) -> Flags:
-    """Return which straights from `corner` to the points `there` (m, 2) touch the edge, (m,)."""
-    return np.asarray(_side(corner, there, before) * _side(corner, there, after) >= 0)
+def _touches(a: Real, b: Real, before: Real, after: Real) -> Flags:
+    """Return whether the straight a b leaves both corners beside one of its ends on one side."""
+    return np.asarray(_side(a, b, before) * _side(a, b, after) >= 0)

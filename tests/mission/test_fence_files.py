@@ -206,7 +206,7 @@ def test_what_is_no_fence_is_refused_with_its_place() -> None:
         (feature("Polygon", [[[47.0, 500.0], *SQUARE]], {"name": "NFZ"}), "fence polygon: 500.0"),
         (feature("Polygon", [[[47.0, "x"], *SQUARE]], {}), r"geometry: .47.0, 'x'.; expected lo"),
         (feature("Polygon", [[[1, 2], [3, 4]]], {"name": "field"}), "2 vertices; expected at"),
-        ({"type": "Polygon", "coordinates": [["a"]]}, "expected longitude, latitude in"),
+        ({"type": "Polygon", "coordinates": [["12"]]}, "'12'; expected longitude, latitude in"),
         (feature("Polygon", [SQUARE], {"inclusion": "perhaps"}), "expected true or false"),
         (feature("Polygon", [SQUARE, HOLE], {"inclusion": False}), "an exclusion with a hole"),
         (

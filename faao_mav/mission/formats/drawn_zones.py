@@ -96,8 +96,8 @@ def _ring(told: Sequence[Sequence[object]]) -> Ring:
 
 def _corner(told: Any) -> LatLon:
     try:
-        longitude, latitude = map(float, told[:2])
-    except (TypeError, ValueError, KeyError, OverflowError):
+        longitude, latitude = map(float, told[:2] if isinstance(told, list) else ())
+    except (TypeError, ValueError, OverflowError):
         raise MissionFileError(f"{quote(told)}; expected longitude, latitude in degrees") from None
     return latitude, longitude
 
