@@ -115,6 +115,22 @@ def test_logs_without_a_radio_or_its_unit_are_told(tmp_path: Path) -> None:
     assert "no radio tells a level in it" in link(log, "--station", PLACE, status=2)
 
 
+def test_a_throughput_is_read_by_the_radios_rates(tmp_path: Path) -> None:
+    path, rates = table(tmp_path, record(60.0)), tmp_path / "rates.csv"
+    steps = np.arange(0.0, 60.0)
+    rates.write_text("snr_db,mbit_per_s\n" + "".join(f"{x},{1 + x}\n" for x in steps))
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    snr = rows[:, 4] + 100.0
+    rows[:, 4] = np.where(snr < 0, 0.0, 1 + np.minimum(snr, 59.0))
+    header = "time_s,latitude,longitude,altitude_m,throughput_mbit_per_s"
+    np.savetxt(path, rows, "%.8f", ",", header=header, comments="")
+    told = link(
+        path, "--station", PLACE, "--power", 20, "--noise", -100, "--rates", rates, "--json"
+    )
+    assert json.loads(told)["reference_gain_db"] == pytest.approx(LAW[0], abs=1.5)
+    assert "give --rates" in link(path, "--station", PLACE, status=2)
+
+
 def test_a_ratio_to_the_noise_needs_both_powers(tmp_path: Path) -> None:
     path = table(tmp_path, record(60.0))
     rows = np.loadtxt(path, delimiter=",", skiprows=1)

@@ -19,7 +19,7 @@ from faao_mav.cli.shared import (
     show,
 )
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import check_apart, check_ending, check_writable, write_whole
+from faao_mav.files import check_apart, check_ending, check_writable, read_text, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
@@ -40,6 +40,9 @@ def link(
     out: Annotated[File, option("LINK.yaml", "What to write: a plan's radio.gain.")] = None,
     power: Annotated[Number, option("DBM", "What was sent, dBm; without: shape only.")] = None,
     noise: Annotated[Number, option("DBM", "Noise of the receiver, dBm: for snr.")] = None,
+    rates: Annotated[
+        File, option("TABLE.csv", "The radio's rates, as a plan has them: for throughput.")
+    ] = None,
     unit: Annotated[
         list[str] | None, option("COLUMN=UNIT", "The unit of a column; may be repeated.")
     ] = None,
@@ -54,10 +57,10 @@ def link(
 ) -> None:
     """Fit the law of a link's path gain to what was measured in flight.
 
-    From tables (CSV) with time, latitude, longitude, altitude and one of rsrp, rssi, snr; or from
-    logs with what a telemetry radio counts, where heights are above home. HEIGHT of the station is
-    above the same. The law has as many terms over the elevation as pay when whole legs and heights
-    are left out of the fit; what it leaves is told as its spread.
+    From tables (CSV) with time, latitude, longitude, altitude and one of rsrp, rssi, snr,
+    throughput; or from logs with what a telemetry radio counts, where heights are above home.
+    HEIGHT of the station is above the same. The law has as many terms over the elevation as pay
+    when whole legs and heights are left out of the fit; what it leaves is told as its spread.
 
     Exit status: 0 fitted; 1 no law holds, nothing is written but the page; 2 unusable arguments or
     input.
@@ -78,7 +81,7 @@ def link(
     ]
     if len(points) > 2 or len({count for count, *_ in points}) < len(points):
         raise InputError("--calibrate: expected one or two different counts")
-    inputs: dict[str, Path | None] = {f"LOG {path}": path for path in logs}
+    inputs: dict[str, Path | None] = {"--rates": rates, **{f"LOG {path}": path for path in logs}}
     if out is not None:
         check_ending(out, "--out", (".yaml", ".yml"))
         check_writable(out)
@@ -92,6 +95,8 @@ def link(
     flights: list[Samples] = []
     for path in logs:
         for samples, told in _flights(path, place, units, points):
+            if told == "mbit/s":
+                samples, told = _by_rates(path, samples, rates), "db"
             if told == "db" and (power is None) != (noise is None):
                 raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
             floor = noise or 0.0 if told == "db" else 0.0
@@ -137,3 +142,26 @@ def _flights(
         t, up = record.t[known], (record.altitude - record.home)[known]
         where = record.latitude[known], record.longitude[known]
         yield samples_at(path, station, t, *where, up, level), unit
+
+
+def _by_rates(path: Path, samples: "Samples", rates: Path | None) -> "Samples":
+    """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.
+
+    What is below the lowest rate or not below the highest may be of any SNR, and is left out.
+    """
+    import numpy as np
+
+    from faao_mav.plan.beside import MAX_CHARACTERS, read_rates
+    from faao_mav.radio.rate_steps import RateSteps
+
+    if rates is None:
+        raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
+    columns = read_rates(read_text(rates, MAX_CHARACTERS, "a table", InputError), str(rates))
+    if "mbit_per_s" not in columns:
+        raise InputError(f"{rates}: no column mbit_per_s, which a throughput needs")
+    steps = RateSteps.of(columns["snr_db"], columns["mbit_per_s"])
+    told = np.where(samples.level < steps.most, samples.level, np.nan)
+    snr = np.interp(told, steps.rates, steps.snr_db, left=np.nan)
+    if lost := int(np.sum(~np.isfinite(snr))):
+        note(f"{path}: {lost} rows at the least or the greatest rate tell no SNR and are left out")
+    return replace(samples, level=snr)

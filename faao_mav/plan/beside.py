@@ -9,13 +9,13 @@ from faao_mav.files import read_text
 from faao_mav.plan.fields import listed
 from faao_mav.plan.yaml_text import load_yaml
 
-_MAX_CHARACTERS = 1_000_000
+MAX_CHARACTERS = 1_000_000
 """Characters of the longest file that is read; chosen: a law of the gain has 500."""
 
 _SNR, _RATES = "snr_db", ("mbit_per_s", "bit_per_s_per_hz")
 
 
-def _rates(text: str, path: str) -> dict[str, list[float]]:
+def read_rates(text: str, path: str) -> dict[str, list[float]]:
     """Return the columns of a table of rates; others, and lines that begin with #, are passed over.
 
     Raises `PlanError` for a table without them, and for what is no number.
@@ -50,7 +50,7 @@ _FILES = (
     (("radio", "gain"), load_yaml),
     (("radio", "base_station", "gain"), load_yaml),
     (("radio", "ground_user", "gain"), load_yaml),
-    (("radio", "rates"), _rates),
+    (("radio", "rates"), read_rates),
 )
 """Keys whose value may be the name of a file with what stands there otherwise, and how it is read:
 from its text, and its name for messages."""
@@ -69,7 +69,7 @@ def filled_in(data: dict[str, Any], source: str) -> Iterator[tuple[tuple[str, ..
         if isinstance(section, dict) and isinstance(name := section.get(keys[-1]), str):
             path = str(Path(source).parent / name)
             try:
-                section[keys[-1]] = read(read_text(path, _MAX_CHARACTERS, "text", PlanError), path)
+                section[keys[-1]] = read(read_text(path, MAX_CHARACTERS, "text", PlanError), path)
             except PlanError as error:
                 raise PlanError(f"{source}: {'.'.join(keys)}: {error}") from None
             yield keys, path
