@@ -92,22 +92,23 @@ def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[
     """Return the waypoints between which a trajectory moves: w_I, the hovers, w_F.
 
     `t` (n,) s, `w` (n, 2) m; `tolerance` is the path tolerance, m; slower than `slowest` m/s it may
-    hover. A hover at an end takes the
-    end's exact position. Neighbours in one place with nothing of note between them are one.
+    hover. A hover at an end takes the end's exact position. Neighbours in one place with nothing of
+    note between them are one.
     """
     end = len(t) - 1
     closed = math.dist(w[0], w[end]) <= _SAME_POINT
     radius = _HOVER_SHARE * tolerance
     hovers = find_hovers(t, w, min(_WIDEST_HOVER, radius), slowest)
     if hovers and hovers[0].first == 0:
-        last = _stay(w[: hovers[0].last + 1], radius) - 1
+        _, last = _around(lengths(w - w[0]) <= radius, 0, 0, hovers[0].last)
         if last == end and not closed:
             last -= 1  # two ends in one hover: leave a leg between them
         hovers[0] = Waypoint(0, last, w[0])
     else:
         hovers.insert(0, Waypoint(0, 0, w[0]))
     if hovers[-1].last == end:
-        hovers[-1] = Waypoint(end + 1 - _stay(w[hovers[-1].first :][::-1], radius), end, w[end])
+        first, _ = _around(lengths(w - w[end]) <= radius, end, hovers[-1].first, end)
+        hovers[-1] = Waypoint(first, end, w[end])
     else:
         hovers.append(Waypoint(end, end, w[end]))
 
@@ -214,12 +215,6 @@ def _around(mask: Flags, at: int, begin: int, end: int) -> tuple[int, int]:
     first = int(outside[k - 1]) + 1 if k else 0
     last = int(outside[k]) - 1 if k < len(outside) else len(mask) - 1
     return max(first, begin), min(last, end)
-
-
-def _stay(w: Real, radius: float) -> int:
-    """Return how many samples from the first on are within `radius` m of the first."""
-    away = lengths(w - w[0]) > radius
-    return int(np.argmax(away)) if away.any() else len(w)
 
 
 def _last_within(w: Real, radius: float) -> int:
