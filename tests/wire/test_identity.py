@@ -1,6 +1,5 @@
 """Who is meant and who speaks: one autopilot at one address, and a station of its own number."""
 
-import socket
 import time
 from collections import defaultdict
 from collections.abc import Sequence
@@ -8,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import PATIENCE, free_port
 from hypothesis import given
 from hypothesis import strategies as st
 from mock_flights import fly as flies
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 from scenes import Scene
-from served import running
 from stations import HOME, VEHICLE, Air, a_mission
 
 from faao_mav.errors import LinkError
@@ -27,16 +24,17 @@ from faao_mav.wire.client import LinkOptions, holdings
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import FoundVehicle, Heard, choose, discover
 from faao_mav.wire.framing import message_id, sender_of
+from faao_mav.wire.link import WireLink
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
     Message,
+    MissionRequestList,
     Statustext,
     Timesync,
 )
 from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address
-from faao_mav.wire.transport import Transport, open_transport
 
 COPTER, ARDUPILOT, ARMED = 2, 3, 128
 BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
@@ -137,18 +135,24 @@ def test_what_else_was_heard_is_told() -> None:
 # ---- two vehicles of one number
 
 
-def in_the_air(monkeypatch: pytest.MonkeyPatch, vehicles: dict[str, MockAutopilot]) -> Air:
-    """Have links lead to `vehicles`, by where they are: each says a heartbeat and its answer."""
+def in_the_air(
+    monkeypatch: pytest.MonkeyPatch, vehicles: dict[str, MockAutopilot], *, echo: bool = False
+) -> Air:
+    """Have links lead to `vehicles`, by where they are: each says a heartbeat and its answer.
+
+    With an `echo` what is sent comes back, as from a router.
+    """
     station, codecs = Codec(GROUND_STATION), defaultdict[str, Codec](lambda: Codec(VEHICLE))
 
     def says(data: bytes | None) -> list[tuple[bytes, str]]:
-        return [
-            (codecs[origin].pack(each), origin)
-            for packet in station.parse(data or b"")
-            if packet.envelope is not None
-            for origin, mock in vehicles.items()
-            for each in (BEAT, *mock.on(packet.envelope, time.monotonic()))
-        ]
+        heard = [each.envelope for each in station.parse(data or b"") if each.envelope]
+        told = [(data, "127.0.0.1:9")] if echo and data else []
+        for origin, mock in vehicles.items():
+            answers = [*mock.tick(now := time.monotonic())]
+            for envelope in heard:
+                answers += BEAT, *mock.on(envelope, now)
+            told += [(codecs[origin].pack(each), origin) for each in answers]
+        return told
 
     air = Air(says)
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
@@ -234,99 +238,60 @@ def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_mock_answers_who_asked() -> None:
-    """Two stations at one socket: what one is answered the other does not hear."""
-    port = free_port()
-    with running(a_mock(rate=0.0), f"udpin:127.0.0.1:{port}"):
-        stations = [mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}") for _ in "ab"]
-        for station in stations:
-            station.mav.timesync_send(0, 1)
-        for station in stations:
-            assert station.recv_match(type="TIMESYNC", blocking=True, timeout=PATIENCE)
-        stations[0].mav.mission_request_list_send(1, 1, 0)
-        assert stations[0].recv_match(type="MISSION_COUNT", blocking=True, timeout=PATIENCE)
-        heard = set()
-        for _ in range(6):
-            heard.add(stations[1].recv_match(blocking=True, timeout=PATIENCE).get_type())
-        assert "MISSION_COUNT" not in heard
-        for station in stations:
-            station.close()
+    """What one is answered nobody else hears; what it says by itself is for everybody."""
+    asked = Codec(GROUND_STATION).pack(MissionRequestList(VEHICLE, 0))
+    air, mock = Air(lambda _: [], waiting=[(asked, HERE)]), a_mock()
+    with WireLink(air, address=VEHICLE) as link:
+        link.begin(mock)
+        link.step(mock, time.monotonic())
+    to = {message_id(data): to for data, to in air.sent}
+    assert (to[44], to[0]) == (HERE, None)  # MISSION_COUNT, HEARTBEAT
 
 
 # ---- who speaks
 
 
-class Recorded:
-    """The transport of a session, with what was sent."""
-
-    def __init__(self, inner: Transport, sent: list[bytes], echo: bool) -> None:
-        self._inner, self._sent, self._echo, self.listens = inner, sent, echo, inner.listens
-        self._back: list[tuple[bytes, str]] = []
-        self.close = inner.close
-
-    def read(self, timeout: float) -> list[tuple[bytes, str]]:
-        back, self._back = self._back, []
-        return [*back, *self._inner.read(0.0 if back else timeout)]
-
-    def write(self, data: bytes, to: str | None = None) -> None:
-        self._sent.append(data)
-        self._inner.write(data, to)
-        if self._echo:
-            self._back.append((data, "127.0.0.1:9"))
-
-
-@pytest.fixture
-def sent(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
-    """Return what sessions send from now on, and have a router send it back to them."""
-    packets = list[bytes]()
-    link = "faao_mav.wire.link.open_transport"
-    monkeypatch.setattr(link, lambda text: Recorded(open_transport(text), packets, echo=True))
-    return packets
-
-
-def beats(packets: list[bytes]) -> list[bytes]:
-    return [packet for packet in packets if message_id(packet) == 0]
-
-
-def test_only_who_flies_is_a_ground_station(sent: list[bytes]) -> None:
+def test_only_who_flies_is_a_ground_station(monkeypatch: pytest.MonkeyPatch) -> None:
     """A failsafe for the loss of the ground station is neither hidden nor set off by looking on."""
-    port, mission = free_port(), a_mission(5)
-    connection = f"udpout:127.0.0.1:{port}"
-    with running(a_mock(speedup=100.0), f"udpin:127.0.0.1:{port}"):
-        assert upload(mission, connection).verified
-        assert download(connection).home == HOME
+    mission, mock, to = a_mission(5), a_mock(speedup=100.0), "udpin:0.0.0.0:1"
+    mock.start(time.monotonic())
+    air = in_the_air(monkeypatch, {HERE: mock}, echo=True)
 
-        def stop(_: object) -> None:
-            raise KeyboardInterrupt
+    def stop(_: object) -> None:
+        raise KeyboardInterrupt
 
-        watched = fly_mission(Flight(mission), connection, watching=stop)
-        assert watched.ending is not None
-        assert watched.ending.kind == "left"
-        assert beats(sent) == []
-        flown = fly_mission(Flight(mission), connection, arm=True)
-        assert flown.ending is not None
-        assert flown.ending.kind == "finished"  # our own heartbeats come back: they are no other's
-    assert {sender_of(packet) for packet in sent} == {GROUND_STATION}
-    heard = [each.envelope for data in beats(sent) for each in Codec(VEHICLE).parse(data)]
+    def beats() -> list[bytes]:
+        return [packet for packet, _ in air.sent if message_id(packet) == 0]
+
+    assert upload(mission, to, system=1).verified
+    assert download(to, system=1).home == HOME
+    watched = fly_mission(Flight(mission), to, watching=stop, system=1)
+    assert watched.ending is not None
+    assert watched.ending.kind == "left"
+    assert beats() == []
+    flown = fly_mission(Flight(mission), to, arm=True, system=1)
+    assert flown.ending is not None
+    assert flown.ending.kind == "finished"  # our own heartbeats come back: they are no other's
+    assert {sender_of(packet) for packet, _ in air.sent} == {GROUND_STATION}
+    heard = [each.envelope for data in beats() for each in Codec(VEHICLE).parse(data)]
     assert {each.message.type for each in heard if each is not None} == {6}  # type: ignore[attr-defined]
     assert GROUND_STATION.system not in range(250, 256)
 
 
-def test_a_vehicle_that_takes_orders_of_one_number_only(sent: list[bytes]) -> None:
+def test_a_vehicle_that_takes_orders_of_one_number_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """ArduPilot with SYSID_ENFORCE, or that bit of MAV_OPTIONS."""
-    port = free_port()
 
     class Strict(MockAutopilot):
         def _receive(self, envelope: Envelope, now: float) -> Any:
             return super()._receive(envelope, now) if envelope.sender.system == 255 else ()
 
-    mock = Strict(behaviour_of("ardupilot"), home=HOME, beat=0.1)
-    connection = f"udpout:127.0.0.1:{port}"
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        report = upload(a_mission(5), connection, system=1, timeouts=HASTY)
-        assert "orders of only MAV_GCS_SYSID" in report.problems[0]
-        assert "--own-system" in report.problems[0]
-        assert upload(a_mission(5), connection, system=1, own_system=255).verified
-    assert {sender_of(packet).system for packet in sent} == {GROUND_STATION.system, 255}
+    air = in_the_air(monkeypatch, {HERE: Strict(behaviour_of("ardupilot"), home=HOME)})
+    report = upload(a_mission(5), "udpin:0.0.0.0:1", system=1, timeouts=HASTY)
+    assert "orders of only MAV_GCS_SYSID" in report.problems[0]
+    assert "--own-system" in report.problems[0]
+    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1, own_system=255).verified
+    senders = {sender_of(packet).system for packet, _ in air.sent}
+    assert senders == {GROUND_STATION.system, 255}
 
 
 def test_who_is_looked_for_is_asked_not_told() -> None:
@@ -383,29 +348,16 @@ def test_only_transfers_knock(monkeypatch: pytest.MonkeyPatch) -> None:
 # ---- MAVLink 1
 
 
-def test_a_vehicle_of_mavlink_1_is_told_so() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
-        vehicle.bind(("127.0.0.1", 0))
-        vehicle.setblocking(False)
-        connection = f"udpout:127.0.0.1:{vehicle.getsockname()[1]}"
-        beat = common.MAVLink_heartbeat_message(COPTER, ARDUPILOT, 0, 0, 3, 3)
-        packet = beat.pack(common.MAVLink(None, 1, 1), force_mavlink1=True)
-
-        def answer(*_: object) -> None:
-            """Say that it is there to whoever sends, and take no notice of what."""
-            try:
-                while True:
-                    vehicle.sendto(packet, vehicle.recvfrom(999)[1])
-            except BlockingIOError:
-                return
-
-        options = LinkOptions(observe=answer, timeouts=HASTY, wait=3.0)
-        with pytest.raises(
-            LinkError, match="it speaks MAVLink 1 only, and does not answer"
-        ) as told:
-            upload(a_mission(5), connection, **options)
-        assert "SERIALn_PROTOCOL 2" in str(told.value)
-        assert "\n" not in str(told.value)
+def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says that it is there to whoever sends, and takes no notice of what."""
+    beat = common.MAVLink_heartbeat_message(COPTER, ARDUPILOT, 0, 0, 3, 3)
+    packet = beat.pack(common.MAVLink(None, 1, 1), force_mavlink1=True)
+    air = Air(lambda data: [] if data is None else [(packet, HERE)])
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
+    with pytest.raises(LinkError, match="it speaks MAVLink 1 only, and does not answer") as told:
+        upload(a_mission(5), "udpin:0.0.0.0:1", system=1, timeouts=HASTY)
+    assert "SERIALn_PROTOCOL 2" in str(told.value)
+    assert "\n" not in str(told.value)
 
 
 def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -422,10 +374,8 @@ def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPa
         return bytes(decoded.pack(common.MAVLink(None, 1, 1), force_mavlink1=True))
 
     monkeypatch.setattr(Codec, "pack", old)
-    port = free_port()
-    with running(a_mock(rate=0.0), f"udpin:127.0.0.1:{port}"):
-        connection = f"udpout:127.0.0.1:{port}"
-        assert upload(a_mission(5), connection, system=1).verified
-        held = holdings(connection, system=1, timeouts=HASTY)
+    in_the_air(monkeypatch, {HERE: a_mock(rate=0.0)})
+    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1).verified
+    held = holdings("udpin:0.0.0.0:1", system=1, timeouts=HASTY)
     assert len(held.mission.items) == 5
     assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about
