@@ -22,6 +22,7 @@ from faao_mav.mission.fence import Fence
 from faao_mav.mission.formats import read_mission, read_mission_file, write_wpl
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import Timeouts
+from faao_mav.wire import download as get
 from faao_mav.wire.messages import Envelope, MissionRequestList
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.transport import Transport
@@ -111,13 +112,6 @@ def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
     assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
     assert "not verified; do not fly it" in result.stderr
     assert "verified     " not in result.stdout
-
-
-def test_no_vehicle_is_status_1(mission_file: Path, port: int) -> None:
-    result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--timeout", 0.3)
-    assert result.exit_code == 1
-    assert result.stdout == ""
-    assert "no heartbeat of an autopilot within 0.3 s" in result.stderr
 
 
 def test_a_port_in_use_is_an_unusable_argument(mission_file: Path, port: int) -> None:
@@ -221,24 +215,17 @@ def test_what_can_be_read_is_written_and_what_cannot_is_told(
 @pytest.mark.usefixtures("hasty")
 def test_a_download_without_a_mission_writes_nothing(port: int, tmp_path: Path) -> None:
     mock, out = Reticent(behaviour_of("px4"), home=HOME, beat=0.1), tmp_path / "m.plan"
-    mock.parts = (MissionType.MISSION,)
+    to = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
-        source = ("--from", f"udpout:127.0.0.1:{port}", "--system", 1)
-        result = run("download", *source, "--out", out)
-    assert result.exit_code == 1
+        with pytest.raises(LinkError, match="fence: not read"):  # Python gets no part for the whole
+            get(to, system=1)
+        mock.parts = (MissionType.MISSION,)
+        result = run("download", "--from", to, "--system", 1, "--out", out)
+        nobody = run("download", "--from", to, "--system", 9, "--out", out, "--timeout", 0.3)
+    assert (result.exit_code, nobody.exit_code) == (1, 1)
     assert "mission: not read: the vehicle stopped answering" in result.stderr
+    assert "no heartbeat of the autopilot of system 9 within 0.3 s" in nobody.stderr
     assert not out.exists()
-
-
-@pytest.mark.usefixtures("hasty")
-def test_python_is_not_given_a_part_for_the_whole(port: int) -> None:
-    from faao_mav.wire import download as get
-
-    with (
-        running(Reticent(behaviour_of("px4"), home=HOME, beat=0.1), f"udpin:127.0.0.1:{port}"),
-        pytest.raises(LinkError, match="fence: not read"),
-    ):
-        get(f"udpout:127.0.0.1:{port}", system=1)
 
 
 def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
