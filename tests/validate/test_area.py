@@ -81,38 +81,6 @@ def test_the_predicted_flight_counts_for_the_margin() -> None:
     assert margin(f"square:300 fly:5;0,0,0;120,50,30,1 {way}") == (30.0, 2)
 
 
-def test_legs_by_jumps_count() -> None:
-    around = "waypoint:-90,60,30 waypoint:-90,0,30 waypoint:90,0,30 waypoint:90,60,30"
-    case = given(f"zone:-22,-30,10 takeoff {around} waypoint:0,-60,30 jump=2,1 return")
-    assert [finding.item for finding in case.by("fence-leg")] == [7]
-    assert "by a jump" in case.by("fence-leg")[0].message
-
-
-@pytest.mark.parametrize("vehicle", ["plane", "px4-plane"])
-def test_circles_of_planes_count(vehicle: str) -> None:
-    for command in ("loiter_unlim", "loiter_turns", "loiter_time", "loiter_to_alt"):
-        radius = "0,150" if command == "loiter_to_alt" else "0,0,150"
-        way = f"{vehicle} takeoff {command}:600,0,60,{radius}"
-        found = given(f"zone:600,140,30 {way}").by("fence-circle")
-        assert [finding.item for finding in found] == [2]
-        center = given(f"zone:600,0,60 {way}")  # round what is not to be flown over
-        assert not center.by("fence-circle") + center.by("fence-leg")
-
-
-@pytest.mark.parametrize(
-    ("line", "leaves"),
-    [
-        ("plane zone:0,60,10 takeoff waypoint:900,0,60 return", True),
-        ("copter zone:0,60,10 takeoff waypoint:900,0,60 return", False),
-        ("plane zone:900,60,10 takeoff waypoint:900,0,60", True),
-        ("plane zone:900,60,10 takeoff waypoint:900,0,60 land", False),
-    ],
-)
-def test_a_plane_circles_where_it_returns_and_where_it_ends(line: str, leaves: bool) -> None:
-    loiter = "WP_LOITER_RAD=60 " if line.startswith("plane") else ""
-    assert bool(given(loiter + line).by("fence-circle")) is leaves
-
-
 def test_between_two_inclusions_is_outside_all() -> None:
     (out,) = given("px4 square:100 square:100,180 takeoff waypoint:180,0,30").by("fence-leg")
     assert "80.0 m of it outside all inclusions" in out.message
