@@ -22,6 +22,8 @@ plan.yaml --out m.txt --report r.pdf | --report r.pdf: give a name that ends in 
 plan.yaml --out m.txt --figure f.jpg | --figure f.jpg: give a name that ends in .png
 plan.yaml --method magic | optimizer.method: 'magic' is not accepted; give direct or
 plan.yaml --method algorithm1 | radio.fading: ergodic is not for algorithm1
+bad.yaml --out m.txt | bad.yaml: flight.altitude: -1
+useless.yaml --out m.txt --save r.npz | vehicle.parameters: WPNAV_JERK: 0
 plan.yaml --nonsense | No such option
 plan.yaml second.yaml | unexpected extra argument
 plan.yaml --out plan.yaml | '.yaml'; expected a name that ends in
@@ -54,6 +56,8 @@ upload m.waypoints --to {NOWHERE} --log no/x.tlog | no directory
 upload m.waypoints --to {NOWHERE} --signing-key no | cannot be read
 download --from nonsense --out x.plan | expected udpin:HOST:PORT
 download --from {NOWHERE} --out x.doc | expected a name
+app no.yaml --no-browser | no.yaml: cannot be read
+app --host 256.1.1.1 --no-browser | --host 256.1.1.1 --port 0:
 autopilot --listen nonsense | expected udpin:HOST:PORT
 autopilot --home 1,2 | expected LAT,LON,ALT
 autopilot --home 91,2,3 | latitude
@@ -79,6 +83,9 @@ def test_what_cannot_be_done_is_said_before_the_work(
     monkeypatch.chdir(tmp_path)
     for name in ("plan.yaml", "plan.txt"):
         Path(name).write_text(edited(FLYABLE, {"radio.fading": "ergodic"}))
+    Path("bad.yaml").write_text(edited(FLYABLE, {"flight.altitude": -1}))
+    useless = {"vehicle.parameters": {"WPNAV_JERK": 0}}
+    Path("useless.yaml").write_text(edited(FLYABLE, useless))
     shutil.copy(DATA / "missions" / "two_current.waypoints", "two_current.waypoints")
     shutil.copy(DATA / "missions" / "plain.waypoints", "m.waypoints")
     shutil.copy(DATA / "logs" / "arducopter.tlog", "log.tlog")
