@@ -206,14 +206,14 @@ def _parsed(text: str, source: str) -> Any:
     return load_yaml(text, source)
 
 
-def problems_of(error: PlanError, source: str, paths: Sequence[str]) -> dict[str, str]:
+def problems_of(error: str, source: str, paths: Sequence[str]) -> dict[str, str]:
     r"""Return what `error` says by the path, of `paths`, that each line is about; "": of none.
 
-    >>> problems_of(PlanError("p: flight.start: bad\np: odd"), "p", ["flight.start"])
+    >>> problems_of("p: flight.start: bad\np: odd", "p", ["flight.start"])
     {'flight.start': 'bad', '': 'odd'}
     """
     found: dict[str, str] = {}
-    for line in str(error).splitlines():
+    for line in error.splitlines():
         told = line.removeprefix(f"{source}: ")
         key, _, problem = told.partition(": ")
         above = [p for p in paths if key == p or key.startswith((f"{p}.", f"{p}["))]

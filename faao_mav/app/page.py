@@ -162,10 +162,8 @@ class Page:
         self._state.update()
 
     def _show(self, answer: Answer) -> None:
-        problems = {}
-        if answer.refused:
-            paths = [key.path for key in fields()]
-            problems = problems_of(PlanError(answer.refused), self._document.source, paths)
+        paths = [key.path for key in fields()]
+        problems = problems_of(answer.refused, self._document.source, paths)
         self._form.tell(problems)
         self._failed.text = answer.failed or "\n".join(
             f"{path}: {problem}" if path else problem for path, problem in problems.items()

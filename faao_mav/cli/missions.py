@@ -139,8 +139,7 @@ def convert(
     Exit status: 0 done; 2 unusable arguments or input.
     """
     from faao_mav.autopilot import Vehicle, kind_by_number
-    from faao_mav.autopilot.files import plan_target
-    from faao_mav.cli.vehicle import told_vehicle
+    from faao_mav.autopilot.files import made_for, plan_target
     from faao_mav.mission.formats import check_readable, check_suffix
 
     check_known(autopilot, None)
@@ -150,8 +149,8 @@ def convert(
     check_apart({"--out": out}, {"MISSION": mission_file})
     read = read_noted(mission_file)
     kind = kind_by_number(read.vehicle_type) or "copter"
-    told = told_vehicle(mission_file, read, None, None, (autopilot, None, None))
-    vehicle = Vehicle(autopilot, kind) if autopilot else told[0] if told is not None else None
+    whose = autopilot or made_for(mission_file, read).autopilot
+    vehicle = Vehicle(whose, kind) if whose is not None else None
     written = write_noted(read.mission, out, plan_target(vehicle))
     items, names = len(read.mission.items), " and ".join(map(str, written.contents))
     show(

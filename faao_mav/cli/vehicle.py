@@ -37,16 +37,16 @@ def choose_vehicle(
     """
     autopilot, kind, parameters = asked
     given = read_parameters(parameters) if parameters is not None else None
-    base, chosen_by = told_vehicle(mission_file, file, plan, given, asked) or (
-        Vehicle(),
-        "by default; --autopilot and --type say otherwise",
-    )
+    if plan is not None:
+        base, chosen_by = plan.aircraft, "as the plan says"
+    elif (named := vehicle_in(file)) is not None:
+        base, chosen_by = named, "as the file says"
+    else:
+        base, chosen_by = _by_parameters(mission_file, file, given, asked)
     if autopilot is not None or kind is not None:
         chosen_by = "as asked"
     whose = autopilot or base.autopilot
-    values, source = base.parameters, base.source
-    if whose != base.autopilot:
-        values = {}
+    values, source = base.parameters if whose == base.autopilot else {}, base.source
     beside = parameter_path(mission_file, whose)
     if given is not None:
         values, source = given, str(parameters)
@@ -64,38 +64,27 @@ def choose_vehicle(
     return Vehicle(whose, kind or base.kind, values, source, body), chosen_by
 
 
-def told_vehicle(
+def _by_parameters(
     mission_file: Path,
     file: "MissionFile",
-    plan: "Plan | None",
     given: dict[str, float] | None,
     asked: tuple[Autopilot | None, Kind | None, Path | None],
-) -> tuple[Vehicle, str] | None:
-    """Return what plan, mission and parameters say of the vehicle, and which of them it was.
-
-    None where nothing tells. Arguments and errors are those of `choose_vehicle`; `given` is what
-    the file of parameters that was asked for holds.
-    """
-    if plan is not None:
-        return plan.aircraft, "as the plan says"
-    named = vehicle_in(file)
-    if named is not None:
-        return named, "as the file says"
+) -> tuple[Vehicle, str]:
+    """Return the vehicle of the parameters `given` or beside the mission, and what told it."""
     autopilot, kind, _ = asked
     if file.vehicle_type and kind is None and kind_by_number(file.vehicle_type) is None:
         raise InputError(
             f"{mission_file}: vehicleType {file.vehicle_type} (a MAV_TYPE) is not supported; "
             f"--type {' or --type '.join(kinds())} says as which the mission is to be judged"
         )
-    if given is not None:
-        theirs = autopilot_of(given)
-    else:
-        beside = {a: parameter_path(mission_file, a) for a in autopilots()}
-        found = [a for a, path in beside.items() if path.is_file()]
-        if len(found) > 1 and autopilot is None:
-            raise InputError(
-                f"{' and '.join(str(beside[a]) for a in found)}: only one of them can belong to "
-                f"{mission_file}: remove the other, or give --autopilot"
-            )
-        theirs = found[0] if len(found) == 1 else None
-    return None if theirs is None else (Vehicle(theirs), "as its parameters say")
+    beside = {each: parameter_path(mission_file, each) for each in autopilots()}
+    found = [each for each, path in beside.items() if path.is_file()]
+    if given is None and len(found) > 1 and autopilot is None:
+        raise InputError(
+            f"{' and '.join(str(beside[each]) for each in found)}: only one of them can belong to "
+            f"{mission_file}: remove the other, or give --autopilot"
+        )
+    theirs = autopilot_of(given) if given is not None else found[0] if len(found) == 1 else None
+    if theirs is not None:
+        return Vehicle(theirs), "as its parameters say"
+    return Vehicle(), "by default; --autopilot and --type say otherwise"

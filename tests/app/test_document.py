@@ -76,7 +76,7 @@ def test_what_plans_do_not_hold_is_kept_as_text_and_told_as_the_command_line_doe
     document.write(("flight", "start"), "[0, 3")
     with pytest.raises(PlanError) as error:
         parse_plan(document.text, "plan.yaml")
-    told = problems_of(error.value, "plan.yaml", [*reference()])
+    told = problems_of(str(error.value), "plan.yaml", [*reference()])
     assert told.keys() == {"flight.start"}
     assert told["flight.start"].startswith("'[0, 3': not two numbers")
     assert str(error.value) == f"plan.yaml: flight.start: {told['flight.start']}"
