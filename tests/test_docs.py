@@ -170,6 +170,11 @@ def test_links_between_pages_lead_somewhere() -> None:
     assert [each for each in targets if not each[1].exists()] == []
 
 
+def test_every_row_of_a_table_has_a_head() -> None:
+    first_rows = r"^(?!\|).*\n(\|.*)\n(?!\|-)"
+    assert [re.findall(first_rows, text, re.M) for text in PAGES.values()] == [[]] * len(PAGES)
+
+
 def test_the_plan_that_is_shown_has_every_default() -> None:
     plans = [parse_plan(block.text) for block in blocks("docs/plan.md") if block.kind == "yaml"]
     shortest, full = map(contents, plans)
