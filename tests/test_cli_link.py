@@ -47,7 +47,7 @@ def table(folder: Path, flight: FlightRecord, name: str = "flight.csv") -> Path:
 def link(*arguments: object, status: int = 0) -> str:
     result = CliRunner().invoke(app, ["link", *map(str, arguments)])
     assert result.exit_code == status, result.output + result.stderr
-    return result.stdout if status == 0 else result.stderr
+    return result.stdout if status < 2 else result.stderr
 
 
 def test_logs_of_every_kind_give_the_law_that_was_flown(tmp_path: Path) -> None:
@@ -84,8 +84,10 @@ def test_a_table_without_a_power_gives_the_shape_alone(tmp_path: Path) -> None:
 def test_where_no_law_holds_nothing_is_written(tmp_path: Path) -> None:
     path, out = table(tmp_path, record(60.0, spread=25.0)), tmp_path / "link.yaml"
     text = link(path, "--station", PLACE, "--out", out, status=1)
-    assert "no law of distance and elevation holds" in text
+    assert "no law       of distance and elevation holds" in text
     assert not out.exists()
+    told = json.loads(link(path, "--station", PLACE, "--out", out, "--json", status=1))
+    assert (told["holds"], told["written"]) == (False, [])
 
 
 @pytest.mark.parametrize(

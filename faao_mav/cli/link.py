@@ -18,7 +18,7 @@ from faao_mav.cli.shared import (
     read_numbers,
     show,
 )
-from faao_mav.errors import FaaoError, InputError
+from faao_mav.errors import InputError
 from faao_mav.files import check_apart, check_ending, check_writable, read_text, write_whole
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def link(
     check_page(report, inputs)
     check_apart({"--out": out, "--report": report}, inputs)
     from faao_mav.radio.fit import fit_link
-    from faao_mav.report.link import link_lines, link_page, link_record, link_yaml, no_law
+    from faao_mav.report.link import link_lines, link_page, link_record, link_yaml
     from faao_mav.report.summary import joined
 
     sent = power or 0.0
@@ -105,13 +105,14 @@ def link(
     fit = fit_link(flights, mean)
     if report is not None:
         write_whole(report, link_page(fit, absolute).encode())
-    if not fit.holds:
-        raise FaaoError(no_law(fit))
-    if out is not None:
+    if out is not None and fit.holds:
         write_whole(out, link_yaml(fit, absolute).encode())
-    files = ", ".join(str(each) for each in (out, report) if each is not None)
-    lines = [*link_lines(fit, absolute), ("files", files or "none: give --out LINK.yaml")]
-    show(lambda: link_record(fit, absolute), lambda: [joined(lines)], as_json=as_json)
+    written = [str(each) for each in (out if fit.holds else None, report) if each is not None]
+    lines = [*link_lines(fit, absolute), ("files", ", ".join(written) or "none")]
+    record = link_record(fit, absolute) | {"written": written}
+    show(lambda: record, lambda: [joined(lines)], as_json=as_json)
+    if not fit.holds:
+        raise typer.Exit(1)
 
 
 def _flights(

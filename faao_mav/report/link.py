@@ -69,16 +69,14 @@ def link_lines(fit: LinkFit, absolute: bool) -> Iterator[Line]:
         )
         yield "error", f"{fit.error:.1f} dB of the gain where it was flown, one standard error"
     if not fit.holds:
-        yield "warning", no_law(fit)
-
-
-def no_law(fit: LinkFit) -> str:
-    """Say that no law holds, and what might."""
-    return (
-        f"no law of distance and elevation holds: measured and fitted are {fit.spread:.1f} dB "
-        f"apart, more than {SPREAD_OF_NO_LAW:g}; nothing is promised: raise the station's antenna "
-        "over what stands about it, or fly higher"
-    )
+        yield (
+            "no law",
+            (
+                f"of distance and elevation holds: {fit.spread:.1f} dB are left, more than "
+                f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
+                "stands about it, or fly higher"
+            ),
+        )
 
 
 def link_record(fit: LinkFit, absolute: bool) -> dict[str, Any]:
