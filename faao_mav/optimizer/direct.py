@@ -1,7 +1,7 @@
 """The direct method: one loop over trajectory and precoders on the true rate.
 
 maximise min(R_U, R_G) of (9), (10) under (11)-(13f), or with `radio.causal` what the relay delivers
-of both rates: see `interior.queue`. More rate in a slot never delivers less, so that the best
+of both rates: see `interior.rewards`. More rate in a slot never delivers less, so that the best
 precoders are the same. For given positions the best precoders of
 every slot are a problem of their own, so that the rates become functions of the trajectory alone;
 by the envelope theorem their gradients are those at the best precoders. What is left is a flight

@@ -108,7 +108,7 @@ def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(
 
     def ends(*_: object, **__: object) -> list[LocalOptimum]:
         values = (0.5, 0.5 + 1e-15)
-        return [LocalOptimum(flight, value, np.ones(2), 1, 0.0, True) for value in values]
+        return [LocalOptimum(flight, value, 1, 0.0, True) for value in values]
 
     monkeypatch.setattr(multistart, "maximize_all", ends)
     flights, field = {"bs": flight, "user": flight}, rate_field(problem, design(problem.plan))
