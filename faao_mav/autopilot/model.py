@@ -1,8 +1,8 @@
 """How a vehicle with given parameters flies: what each vehicle's model answers."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
 from math import inf
 from typing import Any, ClassVar, Protocol, Self
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.flight_path import FlightPath, Flown
-from faao_mav.autopilot.parameter import Parameter, ParameterValues
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, row
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,16 +40,10 @@ class LegDurations(Protocol):
         """
 
 
-def parameter(
-    unit: str, default: float, names: Mapping[str, float], *limits: float, **more: Any
-) -> Any:
-    """Declare a field of a `Model`: the parameter whose key is the field's name.
-
-    `limits` are the least and the greatest value.
-    """
-    bounds = dict(zip(("least", "greatest"), limits, strict=False))
-    told = {"unit": unit, "default": default, "names": names, **bounds, **more}
-    return field(default=default, metadata=told)
+def parameter(*told: Any, **more: Any) -> Any:
+    """Declare a field of a `Model`: a `row` whose key is the name of the field."""
+    declared = row("", *told, **more)
+    return field(default=declared.default, metadata={"row": declared})
 
 
 class Model(ABC):
@@ -72,7 +66,7 @@ class Model(ABC):
         """Yield the parameters that are fields."""
         for each in fields(cls):  # type: ignore[arg-type]
             if each.metadata:
-                yield Parameter(each.name, **each.metadata)
+                yield replace(each.metadata["row"], key=each.name)
 
     @classmethod
     def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:  # noqa: ARG003

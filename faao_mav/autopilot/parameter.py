@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 from faao_mav.autopilot.body import Body
 
@@ -103,6 +103,27 @@ class ParameterValues(Protocol):
 def table(*parameters: Parameter) -> ParameterTable:
     """Return `parameters` by key; of two with one key the later one counts."""
     return MappingProxyType({parameter.key: parameter for parameter in parameters})
+
+
+def row(
+    key: str,
+    unit: str,
+    default: float,
+    new: str,
+    old: str = "",
+    factor: float = 0.01,
+    *,
+    least: float = 0.1,
+    greatest: float = math.inf,
+    **more: Any,
+) -> Parameter:
+    """Return a parameter whose `new` name has the `unit`, and whose `old` one `factor` times it.
+
+    Of angles both names and all numbers are in degrees.
+    """
+    turn = math.radians(1) if unit.startswith("rad") else 1.0
+    names = {new: turn, old: factor * turn} if old else {new: turn}
+    return Parameter(key, unit, default * turn, names, least * turn, greatest * turn, **more)
 
 
 def rule(

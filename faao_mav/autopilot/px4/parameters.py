@@ -4,26 +4,11 @@ Source: PX4 1.16, parameter reference.
 """
 
 from dataclasses import dataclass
-from math import radians
-from typing import Any
+from math import inf
 
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
-from faao_mav.autopilot.parameter import Parameter, rule, table
-
-
-def _own(unit: str, default: float, name: str, least: float = 0.1, **more: Any) -> Any:
-    return parameter(unit, default, {name: 1.0}, least, **more)
-
-
-def _speed(key: str, default: float, name: str, least: float = 0.1) -> Parameter:
-    return Parameter(key, "m/s", default, {name: 1.0}, least)
-
-
-def _angle(key: str, degrees: float, name: str, least: float, greatest: float) -> Parameter:
-    limits = radians(least), radians(greatest)
-    return Parameter(key, "rad", radians(degrees), {name: radians(1)}, *limits)
-
+from faao_mav.autopilot.parameter import row, rule, table
 
 _SHARED = (
     rule("takeoff_land_required", 0, "MIS_TKO_LAND_REQ"),
@@ -47,18 +32,18 @@ class Px4Limits(Model):
     parameters_update); likewise down, and over the ground.
     """
 
-    cruise_speed: float = _own("m/s", 5.0, "MPC_XY_CRUISE", capped_by="max_speed")
-    max_speed: float = _own("m/s", 12.0, "MPC_XY_VEL_MAX")
-    acceleration: float = _own("m/s^2", 3.0, "MPC_ACC_HOR", documented=(2.0, 15.0))
-    jerk: float = _own("m/s^3", 4.0, "MPC_JERK_AUTO")
-    corner_gain: float = _own("1/s", 0.5, "MPC_XY_TRAJ_P", 0.01)
-    error_limit: float = _own("m", 2.0, "MPC_XY_ERR_MAX")
-    acceptance_radius: float = _own("m", 2.0, "NAV_ACC_RAD", 0.05)
-    height_radius: float = _own("m", 0.8, "NAV_MC_ALT_RAD", 0.05)
-    climb_speed: float = _own("m/s", 3.0, "MPC_Z_V_AUTO_UP", capped_by="max_climb_speed")
-    descent_speed: float = _own("m/s", 1.5, "MPC_Z_V_AUTO_DN", capped_by="max_descent_speed")
-    climb_acceleration: float = _own("m/s^2", 4.0, "MPC_ACC_UP_MAX")
-    descent_acceleration: float = _own("m/s^2", 3.0, "MPC_ACC_DOWN_MAX")
+    cruise_speed: float = parameter("m/s", 5.0, "MPC_XY_CRUISE", capped_by="max_speed")
+    max_speed: float = parameter("m/s", 12.0, "MPC_XY_VEL_MAX")
+    acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_HOR", documented=(2.0, 15.0))
+    jerk: float = parameter("m/s^3", 4.0, "MPC_JERK_AUTO")
+    corner_gain: float = parameter("1/s", 0.5, "MPC_XY_TRAJ_P", least=0.01)
+    error_limit: float = parameter("m", 2.0, "MPC_XY_ERR_MAX")
+    acceptance_radius: float = parameter("m", 2.0, "NAV_ACC_RAD", least=0.05)
+    height_radius: float = parameter("m", 0.8, "NAV_MC_ALT_RAD", least=0.05)
+    climb_speed: float = parameter("m/s", 3.0, "MPC_Z_V_AUTO_UP", capped_by="max_climb_speed")
+    descent_speed: float = parameter("m/s", 1.5, "MPC_Z_V_AUTO_DN", capped_by="max_descent_speed")
+    climb_acceleration: float = parameter("m/s^2", 4.0, "MPC_ACC_UP_MAX")
+    descent_acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_DOWN_MAX")
     body: CopterBody = PX4_BODY
 
     def vertical(self, rise: float) -> tuple[float, float]:
@@ -70,26 +55,26 @@ class Px4Limits(Model):
 
 COPTER_TABLE = table(
     *Px4Limits.parameters(),
-    Parameter("greatest_acceleration", "m/s^2", 5.0, {"MPC_ACC_HOR_MAX": 1.0}, 0.1),
-    _angle("lean_angle", 45, "MPC_TILTMAX_AIR", 20, 89),
-    _speed("max_climb_speed", 3.0, "MPC_Z_VEL_MAX_UP"),
-    _speed("max_descent_speed", 1.5, "MPC_Z_VEL_MAX_DN"),
-    _speed("take_off_speed", 1.5, "MPC_TKO_SPEED"),
-    _speed("landing_speed", 0.7, "MPC_LAND_SPEED", 0.05),
+    row("greatest_acceleration", "m/s^2", 5.0, "MPC_ACC_HOR_MAX", least=0.1),
+    row("lean_angle", "rad", 45, "MPC_TILTMAX_AIR", least=20, greatest=89),
+    row("max_climb_speed", "m/s", 3.0, "MPC_Z_VEL_MAX_UP"),
+    row("max_descent_speed", "m/s", 1.5, "MPC_Z_VEL_MAX_DN"),
+    row("take_off_speed", "m/s", 1.5, "MPC_TKO_SPEED"),
+    row("landing_speed", "m/s", 0.7, "MPC_LAND_SPEED", least=0.05),
     *_SHARED,
 )
 """A PX4 multicopter's parameters."""
 
 PLANE_TABLE = table(
-    _speed("cruise_speed", 15.0, "FW_AIRSPD_TRIM", 1.0),
-    _speed("min_speed", 10.0, "FW_AIRSPD_MIN", 1.0),
-    _speed("max_speed", 20.0, "FW_AIRSPD_MAX", 1.0),
-    _angle("roll_limit", 50, "FW_R_LIM", 5, 85),
-    _speed("climb_speed", 5.0, "FW_T_CLMB_MAX"),
-    _speed("descent_speed", 5.0, "FW_T_SINK_MAX"),
-    _angle("landing_angle", 5, "FW_LND_ANG", 0, 85),
-    Parameter("acceptance_radius", "m", 10.0, {"NAV_ACC_RAD": 1.0}, 0.05),
-    Parameter("loiter_radius", "m", 80.0, {"NAV_LOITER_RAD": 1.0}),
+    row("cruise_speed", "m/s", 15.0, "FW_AIRSPD_TRIM", least=1.0),
+    row("min_speed", "m/s", 10.0, "FW_AIRSPD_MIN", least=1.0),
+    row("max_speed", "m/s", 20.0, "FW_AIRSPD_MAX", least=1.0),
+    row("roll_limit", "rad", 50, "FW_R_LIM", least=5, greatest=85),
+    row("climb_speed", "m/s", 5.0, "FW_T_CLMB_MAX"),
+    row("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX"),
+    row("landing_angle", "rad", 5, "FW_LND_ANG", least=0, greatest=85),
+    row("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", least=0.05),
+    row("loiter_radius", "m", 80.0, "NAV_LOITER_RAD", least=-inf),
     *_SHARED,
 )
 """A PX4 plane's parameters."""

@@ -5,33 +5,14 @@ Source: ArduPilot 4.7, parameter list of Copter.
 
 import math
 from dataclasses import dataclass, replace
-from math import radians
-from typing import Any, Self
+from typing import Self
 
 from faao_mav.autopilot.ardupilot import DEGREE, SHARED
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
-from faao_mav.autopilot.parameter import Parameter, ParameterValues, rule, table
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, row, rule, table
 from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.power import GRAVITY
-
-
-def _own(
-    unit: str,
-    default: float,
-    new: str,
-    old: str,
-    factor: float = 0.01,
-    least: float = 0.1,
-    **more: Any,
-) -> Any:
-    return parameter(unit, default, {new: 1.0, old: factor}, least, **more)
-
-
-def _attitude(unit: str, degrees: float, names: tuple[str, str], *limits: float) -> Any:
-    new, old = names
-    return parameter(unit, radians(degrees), {new: radians(1), old: radians(0.01)}, *limits)
-
 
 _LEAST_INPUT_TIME = 0.1
 """The autopilot's own lower bound of ATC_INPUT_TC, s."""
@@ -45,25 +26,25 @@ class ArduCopterLimits(Model):
     the autopilot's metres per metre: it takes the Earth for a sphere. `body` is the aircraft.
     """
 
-    cruise_speed: float = _own("m/s", 10.0, "WP_SPD", "WPNAV_SPEED")
-    climb_speed: float = _own("m/s", 2.5, "WP_SPD_UP", "WPNAV_SPEED_UP")
-    descent_speed: float = _own("m/s", 1.5, "WP_SPD_DN", "WPNAV_SPEED_DN")
-    acceleration: float = _own("m/s^2", 2.5, "WP_ACC", "WPNAV_ACCEL", documented=(0.5, 5.0))
-    climb_acceleration: float = _own("m/s^2", 1.0, "WP_ACC_Z", "WPNAV_ACCEL_Z")
-    corner_acceleration: float = _own("m/s^2", 0.0, "WP_ACC_CNR", "WPNAV_ACCEL_C", least=0.0)
-    jerk: float = _own("m/s^3", 1.0, "WP_JERK", "WPNAV_JERK", 1.0)
-    radius: float = _own("m", 2.0, "WP_RADIUS_M", "WPNAV_RADIUS", least=0.05)
-    lean_angle: float = _attitude(
-        "rad", 30, ("ATC_ANGLE_MAX", "ANGLE_MAX"), radians(5), radians(85)
+    cruise_speed: float = parameter("m/s", 10.0, "WP_SPD", "WPNAV_SPEED")
+    climb_speed: float = parameter("m/s", 2.5, "WP_SPD_UP", "WPNAV_SPEED_UP")
+    descent_speed: float = parameter("m/s", 1.5, "WP_SPD_DN", "WPNAV_SPEED_DN")
+    acceleration: float = parameter("m/s^2", 2.5, "WP_ACC", "WPNAV_ACCEL", documented=(0.5, 5.0))
+    climb_acceleration: float = parameter("m/s^2", 1.0, "WP_ACC_Z", "WPNAV_ACCEL_Z")
+    corner_acceleration: float = parameter("m/s^2", 0.0, "WP_ACC_CNR", "WPNAV_ACCEL_C", least=0.0)
+    jerk: float = parameter("m/s^3", 1.0, "WP_JERK", "WPNAV_JERK", 1.0)
+    radius: float = parameter("m", 2.0, "WP_RADIUS_M", "WPNAV_RADIUS", least=0.05)
+    lean_angle: float = parameter("rad", 30, "ATC_ANGLE_MAX", "ANGLE_MAX", least=5, greatest=85)
+    input_time: float = parameter("s", 0.15, "ATC_INPUT_TC", least=0.0)
+    roll_acceleration: float = parameter(
+        "rad/s^2", 1100, "ATC_ACC_R_MAX", "ATC_ACCEL_R_MAX", least=0.0
     )
-    input_time: float = parameter("s", 0.15, {"ATC_INPUT_TC": 1.0}, 0.0)
-    roll_acceleration: float = _attitude("rad/s^2", 1100, ("ATC_ACC_R_MAX", "ATC_ACCEL_R_MAX"), 0.0)
-    pitch_acceleration: float = _attitude(
-        "rad/s^2", 1100, ("ATC_ACC_P_MAX", "ATC_ACCEL_P_MAX"), 0.0
+    pitch_acceleration: float = parameter(
+        "rad/s^2", 1100, "ATC_ACC_P_MAX", "ATC_ACCEL_P_MAX", least=0.0
     )
-    position_gain: float = _own("1/s", 1.0, "PSC_NE_POS_P", "PSC_POSXY_P", 1.0)
-    velocity_gain: float = _own("1/s", 2.0, "PSC_NE_VEL_P", "PSC_VELXY_P", 1.0)
-    velocity_integral: float = _own("1/s^2", 1.0, "PSC_NE_VEL_I", "PSC_VELXY_I", 1.0, 0.0)
+    position_gain: float = parameter("1/s", 1.0, "PSC_NE_POS_P", "PSC_POSXY_P", 1.0)
+    velocity_gain: float = parameter("1/s", 2.0, "PSC_NE_VEL_P", "PSC_VELXY_P", 1.0)
+    velocity_integral: float = parameter("1/s^2", 1.0, "PSC_NE_VEL_I", "PSC_VELXY_I", 1.0, least=0)
     east_metre: float = 1.0
     north_metre: float = 1.0
     body: CopterBody = ARDUCOPTER_BODY
@@ -101,13 +82,13 @@ class ArduCopterLimits(Model):
 
 TABLE = table(
     *ArduCopterLimits.parameters(),
-    Parameter("landing_speed", "m/s", 0.5, {"LAND_SPD_MS": 1.0, "LAND_SPEED": 0.01}, 0.05),
-    Parameter("return_height", "m", 15.0, {"RTL_ALT_M": 1.0, "RTL_ALT": 0.01}, 0.0, motion=False),
+    row("landing_speed", "m/s", 0.5, "LAND_SPD_MS", "LAND_SPEED", least=0.05),
+    row("return_height", "m", 15.0, "RTL_ALT_M", "RTL_ALT", least=0.0, motion=False),
     *SHARED,
     rule("fence_options", 0, "FENCE_OPTIONS"),
     rule("fence_type", 7, "FENCE_TYPE"),
-    Parameter("circle_radius", "m", 10.0, {"CIRCLE_RADIUS_M": 1.0, "CIRCLE_RADIUS": 0.01}, 0.0),
-    Parameter("circle_rate", "rad/s", radians(20), {"CIRCLE_RATE": radians(1)}),
+    row("circle_radius", "m", 10.0, "CIRCLE_RADIUS_M", "CIRCLE_RADIUS", least=0.0),
+    row("circle_rate", "rad/s", 20, "CIRCLE_RATE", least=-math.inf),
     Parameter("rally_limit", "m", 300.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
     rule("rally_home", 1, "RALLY_INCL_HOME"),
 )

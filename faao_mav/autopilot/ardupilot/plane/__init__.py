@@ -14,7 +14,7 @@ from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPla
 from faao_mav.autopilot.body import ARDUPLANE_BODY
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
-from faao_mav.autopilot.parameter import Parameter, rule, table
+from faao_mav.autopilot.parameter import Parameter, row, rule, table
 from faao_mav.autopilot.vehicle_type import VehicleType
 
 _LOITER, _RTL = 12, 11
@@ -24,10 +24,8 @@ _MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL})
 
 _TABLE = table(
     *ArduPlane.parameters(),
-    Parameter("loiter_radius", "m", 60.0, {"WP_LOITER_RAD": 1.0}, 1.0, either_sign=True),
-    Parameter(
-        "return_height", "m", 100.0, {"RTL_ALTITUDE": 1.0, "ALT_HOLD_RTL": 0.01}, -1.0, motion=False
-    ),
+    row("loiter_radius", "m", 60.0, "WP_LOITER_RAD", least=1, either_sign=True),
+    row("return_height", "m", 100.0, "RTL_ALTITUDE", "ALT_HOLD_RTL", least=-1, motion=False),
     *SHARED,
     rule("fence_options", 1, "FENCE_OPTIONS"),
     rule("fence_type", 4, "FENCE_TYPE"),

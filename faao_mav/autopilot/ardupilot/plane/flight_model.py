@@ -56,24 +56,16 @@ class ArduPlane(Model):
     with an idling engine.
     """
 
-    cruise_speed: float = parameter(
-        "m/s", 12.0, {"AIRSPEED_CRUISE": 1.0, "TRIM_ARSPD_CM": 0.01}, 1.0
-    )
-    min_speed: float = parameter("m/s", 9.0, {"AIRSPEED_MIN": 1.0, "ARSPD_FBW_MIN": 1.0}, 1.0)
-    max_speed: float = parameter("m/s", 22.0, {"AIRSPEED_MAX": 1.0, "ARSPD_FBW_MAX": 1.0}, 1.0)
-    roll_limit: float = parameter(
-        "rad",
-        radians(45),
-        {"ROLL_LIMIT_DEG": radians(1), "LIM_ROLL_CD": radians(0.01)},
-        radians(5),
-        radians(85),
-    )
-    roll_time: float = parameter("s", 0.5, {"RLL2SRV_TCONST": 1.0}, 0.05)
-    waypoint_radius: float = parameter("m", 90.0, {"WP_RADIUS": 1.0}, 1.0)
-    climb_speed: float = parameter("m/s", 5.0, {"TECS_CLMB_MAX": 1.0}, 0.1)
-    descent_speed: float = parameter("m/s", 2.0, {"TECS_SINK_MIN": 1.0}, 0.1)
-    period: float = parameter("s", 17.0, {"NAVL1_PERIOD": 1.0}, 1.0)
-    damping: float = parameter("", 0.75, {"NAVL1_DAMPING": 1.0}, 0.1)
+    cruise_speed: float = parameter("m/s", 12.0, "AIRSPEED_CRUISE", "TRIM_ARSPD_CM", least=1)
+    min_speed: float = parameter("m/s", 9.0, "AIRSPEED_MIN", "ARSPD_FBW_MIN", 1.0, least=1)
+    max_speed: float = parameter("m/s", 22.0, "AIRSPEED_MAX", "ARSPD_FBW_MAX", 1.0, least=1)
+    roll_limit: float = parameter("rad", 45, "ROLL_LIMIT_DEG", "LIM_ROLL_CD", least=5, greatest=85)
+    roll_time: float = parameter("s", 0.5, "RLL2SRV_TCONST", least=0.05)
+    waypoint_radius: float = parameter("m", 90.0, "WP_RADIUS", least=1)
+    climb_speed: float = parameter("m/s", 5.0, "TECS_CLMB_MAX")
+    descent_speed: float = parameter("m/s", 2.0, "TECS_SINK_MIN")
+    period: float = parameter("s", 17.0, "NAVL1_PERIOD", least=1)
+    damping: float = parameter("", 0.75, "NAVL1_DAMPING")
     body: PlaneBody = ARDUPLANE_BODY
 
     least: ClassVar[float] = 0.0
