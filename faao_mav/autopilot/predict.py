@@ -205,8 +205,7 @@ class _Walk:
     def _at_least(self, path: FlightPath) -> float:
         """Return how long `path` takes without ramps, s."""
         ways = np.diff(path.points, axis=0)
-        speeds = np.where(path.speeds > 0, path.speeds, self._model.cruise_speed)
-        level, rise = np.hypot(ways[:, 0], ways[:, 1]) / speeds, ways[:, 2]
+        level, rise = np.hypot(ways[:, 0], ways[:, 1]) / path.speeds, ways[:, 2]
         limit = np.where(rise > 0, self._vertical.climb_speed, self._vertical.descent_speed)
         legs = np.maximum(level, np.abs(rise) / limit)
         return float(legs.sum() + np.sum(path.holds + path.delays))
