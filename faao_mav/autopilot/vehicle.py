@@ -119,14 +119,13 @@ class Vehicle:
 
     def usable(self) -> "Vehicle":
         """Return the vehicle without the parameters that are no use: those have their defaults."""
-        useless = {
-            name
-            for parameter in self.type.parameters.values()
-            for name in parameter.names
-            if name in self.parameters and not parameter.is_usable(self.parameters[name], name)
+        table = self.type.parameters.values()
+        kept = {
+            name: number
+            for name, number in self.parameters.items()
+            if all(each.is_usable(number, name) for each in table if name in each.names)
         }
-        kept = {name: x for name, x in self.parameters.items() if name not in useless}
-        return replace(self, parameters=kept) if useless else self
+        return replace(self, parameters=kept) if len(kept) < len(self.parameters) else self
 
     @property
     def vertical(self) -> VerticalProfile:
