@@ -273,7 +273,6 @@ class Session(WireLink):
             component,
             patience=wait,
             settle=SETTLE if self.listens else None,
-            boot=timeouts.boot,
             knocks=knocks and parse_connection(connection).kind == "serial",
         )
         try:

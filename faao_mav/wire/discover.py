@@ -21,6 +21,7 @@ from faao_mav.wire.protocol import (
     MavState,
     listed,
 )
+from faao_mav.wire.questions import BOOT
 from faao_mav.wire.transport import Origin
 
 _MAIN = 1
@@ -87,7 +88,6 @@ def discover(
     *,
     patience: float = 10.0,
     settle: float | None = None,
-    boot: float = 60.0,
     knocks: bool = False,
 ) -> Talk[Heard]:
     """Listen for heartbeats.
@@ -98,7 +98,7 @@ def discover(
 
     It ends `settle` seconds after the first, in which others are heard, once all are ready (at once
     where a `system` is given, unless told otherwise); after `patience` seconds without any; and
-    after `boot` seconds in any case.
+    after `BOOT` seconds in any case.
 
     Until there is one it asks whoever is there for the time (TIMESYNC): a vehicle that answers
     where it was spoken to has to be spoken to. With `knocks` it sends a heartbeat too where nothing
@@ -138,7 +138,7 @@ def discover(
                 if address.component == _MAIN or address.system not in mains
             )
             complete = all(each.address.component == _MAIN for each in vehicles)
-            ready = all(each.ready for each in vehicles) or line.now >= begun + boot
+            ready = all(each.ready for each in vehicles) or line.now >= begun + BOOT
             if line.now >= settled and ready and (complete or waited or component):
                 return Heard(vehicles, tuple(others.values()))
             due = line.now + _LOOK_AGAIN

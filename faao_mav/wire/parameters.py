@@ -78,7 +78,7 @@ def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
     """
     line = yield AT_ONCE
     left = list(dict.fromkeys(parameters))
-    asked, total = Questions[Names](line, Pace(peer.timeouts), _LEAST_WAIT), len(left)
+    asked, total = Questions[Names](line, Pace(), _LEAST_WAIT), len(left)
     names_of = {name: names for names in left for name in names}
     values, kinds, missing = dict[str, float](), dict[str, int](), list[Names]()
     while (left or asked) and (values or not missing):

@@ -16,23 +16,26 @@ M = TypeVar("M", bound=Message)
 
 @dataclass(frozen=True, slots=True)
 class Timeouts:
-    """How long a transfer waits, s.
+    """When a transfer is given up.
 
-    `response` and `item` are the guide's: the longest time after which a question is put again, and
-    the time before it is known how long answers take. `quickest` is the shortest: vehicles answer
-    in the turns of their main loop, of which the slowest (ArduPlane's) has 50 a second. `silence`
-    is how long a transfer may get no further before it is given up: PX4 asks again for 5 s,
-    ArduPilot for 8 s. `boot` is how long a vehicle may boot, `attempts` how often a whole transfer
-    is begun.
+    `silence` is how many seconds it may get no further: PX4 asks again for 5 s, ArduPilot for 8 s.
+    `attempts` is how often it is begun.
     """
 
-    response: float = 1.5
-    item: float = 0.25
-    quickest: float = 0.02
     silence: float = 9.0
-    boot: float = 60.0
     attempts: int = 3
 
+
+BOOT = 60.0
+"""Seconds that a vehicle may boot; chosen."""
+
+_FIRST, SLOWEST = 0.25, 1.5
+"""Seconds after which a question is put again while it is not known how long answers take, and at
+the latest: the guide's."""
+
+_QUICKEST = 0.02
+"""Seconds after which it is put again at the earliest: vehicles answer in the turns of their main
+loop, of which the slowest (ArduPlane's) has 50 a second."""
 
 _GROWTH = 1.25
 """By how much the wait grows with each question that has to be put again; chosen."""
@@ -44,21 +47,20 @@ _LONGEST = 0.5
 class Pace:
     """How long to `wait` for an answer before it is asked for again, s.
 
-    It is `Timeouts.item` at first, then the mean and four deviations of the time that answers take
+    It is `_FIRST` at first, then the mean and four deviations of the time that answers take
     (RFC 6298). An answer to a question that was put again tells nothing of that time (Karn's rule):
     the wait grows, so that a link that has become slow is measured in the end.
     """
 
-    def __init__(self, timeouts: Timeouts) -> None:
-        self._timeouts = timeouts
+    def __init__(self) -> None:
         self.mean: float | None = None
         """Mean time of answers, s; None before the first one."""
         self._deviation = 0.0
-        self.wait = timeouts.item
+        self.wait = _FIRST
 
     def repeat(self) -> None:
         """Note that a question has to be put again."""
-        self.wait = min(_GROWTH * self.wait, self._timeouts.response)
+        self.wait = min(_GROWTH * self.wait, SLOWEST)
 
     def answer(self, took: float) -> None:
         """Note how long the answer took to a question that was put once."""
@@ -67,8 +69,7 @@ class Pace:
         else:
             self._deviation += (abs(took - self.mean) - self._deviation) / 4
             self.mean += (took - self.mean) / 8
-        wait = max(self.mean + 4 * self._deviation, self._timeouts.quickest)
-        self.wait = min(wait, self._timeouts.response)
+        self.wait = min(max(self.mean + 4 * self._deviation, _QUICKEST), SLOWEST)
 
 
 @dataclass(slots=True)
@@ -154,7 +155,7 @@ def ask(
     """
     line = yield AT_ONCE
     line.progress = what, 0, 0
-    asked, until = Questions[int](line, Pace(Timeouts())), line.now + patience
+    asked, until = Questions[int](line, Pace()), line.now + patience
     asked.put(0, question)
     while line.now < until:
         line = yield min(asked.due, until)

@@ -19,7 +19,7 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.mission import Mission
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
-from faao_mav.wire import Timeouts, download, upload
+from faao_mav.wire import download, upload
 from faao_mav.wire.protocol import Address, MissionType
 from faao_mav.wire.transport import open_transport, parse_connection
 from faao_mav.wire.wire_items import wire_items
@@ -43,13 +43,13 @@ def test_a_mission_there_and_back(kind: MockKind, port: int) -> None:
     mission = a_mission(8)
     faults = Faults(loss=0.2, latency=0.0, seed=3)
     with running(mock_of(kind), f"udpin:127.0.0.1:{port}", faults=faults) as mock:
-        connection, timeouts = f"udpout:127.0.0.1:{port}", Timeouts(response=0.4)
-        report = upload(mission, connection, system=1, timeouts=timeouts)
+        connection = f"udpout:127.0.0.1:{port}"
+        report = upload(mission, connection, system=1)
         assert report.verified, report.problems
         assert places(mock.lists.items(MISSION)) == places(
             wire_items(mission, MISSION, vehicle_of(kind))
         )
-        found = download(connection, system=1, timeouts=timeouts)
+        found = download(connection, system=1)
     assert places(wire_items(found, MISSION, vehicle_of(kind))) == places(
         wire_items(mission, MISSION, vehicle_of(kind))
     )

@@ -40,7 +40,7 @@ COPTER, ARDUPILOT, ARMED = 2, 3, 128
 BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
 COMPANION = Address(1, 191)
 HERE, ELSEWHERE = "192.0.2.1:14550", "192.0.2.7:14550"
-HASTY = Timeouts(response=0.1, attempts=1, silence=0.3)
+HASTY = Timeouts(attempts=1, silence=0.3)
 
 
 def a_mock(system: int = 1, **options: Any) -> MockAutopilot:

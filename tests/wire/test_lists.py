@@ -231,7 +231,7 @@ def test_a_download_that_is_always_ended_is_begun_anew_a_few_times() -> None:
 def test_a_link_is_never_flooded(least: float, jitter: float, loss: float, seed: int) -> None:
     """A tenth more questions than needed, once it is known how long answers take."""
     random, line = Random(seed), Line()
-    questions = Questions[int](line, Pace(Timeouts()))
+    questions = Questions[int](line, Pace())
     needed = 0
     for _ in range(200):
         questions.put(0, READY)

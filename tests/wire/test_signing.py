@@ -31,7 +31,7 @@ TEXT = Statustext(6, "hello")
 NOW = 1_800_000_000.0
 """A time after 2015, s since 1970."""
 
-HASTY = Timeouts(response=0.4, attempts=1, silence=0.5)
+HASTY = Timeouts(attempts=1, silence=0.5)
 
 
 @pytest.fixture

@@ -175,7 +175,7 @@ class Reticent(MockAutopilot):
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command that soon gives up."""
-    quick = Timeouts(response=0.1, attempts=1, silence=0.3)
+    quick = Timeouts(attempts=1, silence=0.3)
     monkeypatch.setattr("faao_mav.wire.client.Timeouts", lambda: quick)
 
 

@@ -22,7 +22,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import Address, MavResult, MavState, MissionType
-from faao_mav.wire.questions import Pace, Questions, Timeouts
+from faao_mav.wire.questions import BOOT, SLOWEST, Pace, Questions, Timeouts
 
 Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "armed", "cancelled"]
 
@@ -66,11 +66,8 @@ class Peer:
     vehicle: VehicleType | None
     may_be_armed: bool = False
     timeouts: Timeouts = field(default_factory=Timeouts)
-    pace: Pace = field(init=False)
+    pace: Pace = field(default_factory=Pace)
     beat: Heartbeat | None = None
-
-    def __post_init__(self) -> None:
-        self.pace = Pace(self.timeouts)
 
     @property
     def manners(self) -> Manners:
@@ -128,7 +125,7 @@ class _Exchange:
         """Note a refusal that counts only when nothing else is said."""
         self.result = result
         if _OPENING not in self.asked:  # which a busy vehicle is asked until it is free
-            self.until = min(self.until, self._line.now + self._peer.timeouts.response)
+            self.until = min(self.until, self._line.now + SLOWEST)
 
     def hear(self) -> Talk[ListMessage | None]:
         """Return what the vehicle says of the list, asking again meanwhile; None: it is over."""
@@ -278,7 +275,7 @@ def send_list(
             case MissionAck(type=MavResult.OPERATION_CANCELLED as result):
                 return exchange.ended("cancelled", result, reached)
             case MissionAck(type=result):
-                boots_until = min(boots_until, line.now + peer.timeouts.boot)
+                boots_until = min(boots_until, line.now + BOOT)
                 if not (yield from exchange.boots(result, boots_until)):
                     return exchange.over(reached)
                 current, furthest = begin()
