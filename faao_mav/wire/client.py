@@ -12,7 +12,7 @@ from faao_mav.autopilot import families
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
-from faao_mav.wire.discover import SETTLE, FoundVehicle, choose, discover
+from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition, WireItem
@@ -272,7 +272,7 @@ class Session(WireLink):
             system,
             component,
             patience=wait,
-            settle=SETTLE if self.listens else None,
+            listens=self.listens,
             knocks=knocks and parse_connection(connection).kind == "serial",
         )
         try:

@@ -27,7 +27,7 @@ from faao_mav.wire.transport import Origin
 _MAIN = 1
 """MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
-SETTLE = 1.2
+_SETTLE = 1.2
 """Seconds after the first vehicle in which others are heard: chosen, above a heartbeat's period."""
 
 _LOOK_AGAIN = 0.2
@@ -87,7 +87,7 @@ def discover(
     component: int | None = None,
     *,
     patience: float = 10.0,
-    settle: float | None = None,
+    listens: bool = False,
     knocks: bool = False,
 ) -> Talk[Heard]:
     """Listen for heartbeats.
@@ -96,9 +96,9 @@ def discover(
     that is component 1, for which it waits as long as it has `patience`, and any other only
     without it. `system` and `component` leave out all others.
 
-    It ends `settle` seconds after the first, in which others are heard, once all are ready (at once
-    where a `system` is given, unless told otherwise); after `patience` seconds without any; and
-    after `BOOT` seconds in any case.
+    It ends `_SETTLE` seconds after the first, in which others are heard, once all are ready; at
+    once where a `system` is given, unless the link `listens` to whoever calls; after `patience`
+    seconds without any, and after `BOOT` seconds in any case.
 
     Until there is one it asks whoever is there for the time (TIMESYNC): a vehicle that answers
     where it was spoken to has to be spoken to. With `knocks` it sends a heartbeat too where nothing
@@ -121,8 +121,7 @@ def discover(
                     others[sender] = str(vehicle) if message.of_autopilot else beside
                 else:
                     if not found:
-                        usual = SETTLE if system is None else 0.0
-                        due = settled = line.now + (usual if settle is None else settle)
+                        due = settled = line.now + _SETTLE * (system is None or listens)
                     armed = vehicle.armed or (sender in found and found[sender].armed)
                     found[sender] = replace(vehicle, armed=armed)
         waited = line.now >= begun + patience

@@ -133,7 +133,7 @@ def _session(kind: MockKind) -> tuple[bytes, bytes]:
 def _hear(tape: bytes) -> object:
     """Do all that a client does with a vehicle that says what is on `tape`, and tell of it."""
     codec, heard = Codec(GROUND_STATION), datagrams(tape)
-    discovery = Script(discover(patience=1.0, settle=0.0))
+    discovery = Script(discover(1, patience=1.0))
     now = converse(discovery, codec, heard, 0.0)
     assert discovery.outcome is not None
     found = choose(discovery.outcome, "tape", None, None, 1.0)
