@@ -19,7 +19,7 @@ from faao_mav.wire.transfer.exchange import (
 from faao_mav.wire.transfer.verify import Difference, compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
 
-Verdict: TypeAlias = Literal[
+PartVerdict: TypeAlias = Literal[
     "verified", "different", "unread", "refused", "silent", "armed", "cancelled"
 ]
 
@@ -40,7 +40,7 @@ class PartReport:
 
     part: MissionType
     items: int
-    verdict: Verdict
+    verdict: PartVerdict
     differences: tuple[Difference, ...] = ()
     result: int | None = None
     item: int | None = None
@@ -109,7 +109,7 @@ def clear_lists(types: Sequence[MissionType], peer: Peer) -> Talk[tuple[PartRepo
             read = yield from read_list(peer, part)
             if read.status == "accepted":
                 differences = compare((), read.items, part, peer.vehicle)
-                verdict: Verdict = "different" if differences else "verified"
+                verdict: PartVerdict = "different" if differences else "verified"
                 report = replace(report, verdict=verdict, differences=differences)
         reports.append(report)
         if report.verdict in ("silent", "armed", "cancelled"):
@@ -152,7 +152,7 @@ def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> 
 
 def _unread(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
     """Return the report for `outcome` as long as nothing was read back."""
-    verdict: Verdict
+    verdict: PartVerdict
     match outcome.status:
         case "accepted":
             verdict = "unread"
