@@ -152,15 +152,10 @@ def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> 
 
 def _unread(part: MissionType, items: int, outcome: Outcome, attempts: int) -> PartReport:
     """Return the report for `outcome` as long as nothing was read back."""
-    verdict: PartVerdict
-    match outcome.status:
-        case "accepted":
-            verdict = "unread"
-        case "unknown":
-            verdict = "silent"
-        case verdict:
-            pass
-    result, said = outcome.result, outcome.said
+    status, result, said = outcome.status, outcome.result, outcome.said
+    verdict: PartVerdict = (
+        "unread" if status == "accepted" else "silent" if status == "unknown" else status
+    )
     return PartReport(part, items, verdict, (), result, outcome.last_requested, attempts, said)
 
 
