@@ -16,6 +16,7 @@ from faao_mav.fly.seen import Flight, Held, read_held
 from faao_mav.fly.telemetry import Telemetry
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check
+from faao_mav.validate.lean import beyond_lean
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.words import counted
 from faao_mav.wire.machine import Script
@@ -239,6 +240,9 @@ def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Ite
         else:
             row = "loss-acts" if told.acts else "loss-idle"
             yield _found(row, rule=rule, loss=loss, does=told.text)
+    if flight.streamed and flight.solution is not None:
+        lean = beyond_lean(flight.solution, own)
+        yield from [_found("lean", told=lean)] if lean is not None else []
     if flight.streamed and (refusal := rules.refusal(values)) is not None:
         yield _found("on-setpoints-lost", does=refusal[0], instead=refusal[1])
     elif flight.streamed:

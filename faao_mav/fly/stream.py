@@ -16,7 +16,6 @@ from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.telemetry import PATIENCE
 from faao_mav.fly.watch import Watch
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.lean import beyond_lean
 from faao_mav.wire.messages import (
     CommandLong,
     CurrentMode,
@@ -72,15 +71,14 @@ class Stream(Watch):
         *,
         rate: float = 10.0,
     ) -> None:
-        plan = solution.plan
-        finish = plan.mission.on_finish
+        plan, finish = solution.plan, solution.plan.mission.on_finish
         super().__init__(peer, (), readiness, arm=True, lands=finish != "hover", rate=rate)
         if self._modes.guided is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._guided, self._rules = self._modes.guided, self._family.setpoints
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if self._lands else "hold"]
-        self._solution, self._readiness = solution, readiness
+        self._readiness = readiness
         self._height, self._top = plan.flight.altitude, plan.max_ground_speed
         self._period = 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2
@@ -138,9 +136,6 @@ class Stream(Watch):
         return late if age > _OLD else super()._lacks(now)
 
     def _set_out(self, now: float) -> Sequence[Message]:
-        lean = beyond_lean(self._solution, self._solution.plan.aircraft)
-        if lean is not None:
-            self.seen.told.append(lean)
         self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
         self.phase, self._asked = "engaging", {self.seen.custom_mode}
         if self._rules.takes_off_by_setpoints:
