@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from faao_mav.autopilot import Track, Vehicle
-from faao_mav.geodesy import LocalFrame
+from faao_mav.arrays import Real
+from faao_mav.autopilot import Vehicle
 from faao_mav.mission import Mission
 from faao_mav.plan import parse_plan
 from faao_mav.plan.energy import PowerOptions
@@ -110,7 +110,7 @@ def test_a_plane_flies_farthest_at_the_speed_of_its_measured_power() -> None:
     assert power[1000] == pytest.approx(100.0)
 
 
-def flight(wind: float) -> Track:
+def flight(wind: float) -> tuple[Real, Real]:
     """Up at 2 m/s for 10 s, east faster and faster for 20 s, down at 1 m/s for 20 s."""
     t = np.linspace(0, 50, 5001)
     velocity = np.zeros((len(t), 3))
@@ -118,15 +118,14 @@ def flight(wind: float) -> Track:
     east = (t > 10) & (t <= 30)
     velocity[east, 0] = 0.5 * (t[east] - 10)
     velocity[:, 0] += wind
-    position = np.zeros((len(t), 3))
-    return Track(t, position, velocity, np.zeros(len(t), int), np.zeros(1), LocalFrame(47, 8))
+    return t, velocity
 
 
 BATTERY = {"vehicle.power": {}, "vehicle.battery": {"capacity_wh": 4, "reserve": "30 %"}}
 
 
 def used(changes: dict[str, object], wind: float = 0.0) -> EnergyUse:
-    found = energy_use(parse_plan(edited(SMALL, BATTERY | changes)), flight(wind), (wind, 0.0))
+    found = energy_use(parse_plan(edited(SMALL, BATTERY | changes)), *flight(wind), (wind, 0.0))
     assert found is not None
     return found
 

@@ -5,8 +5,6 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Track
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.rough import RoughFlight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.energy import energy_use
@@ -84,11 +82,8 @@ def _plots(flight: RoughFlight | Solution) -> list[tuple[dict[str, Real], str]]:
         ({"delivered": held * np.cumsum(relayed.forwarded)}, unit),
         ({"speed": lengths(flight.v)}, "m/s"),
     ]
-    level = np.zeros((len(flight.t), 1))
-    position, velocity = np.hstack([flight.w, level]), np.hstack([flight.v, level])
-    frame, items = LocalFrame(plan.origin.latitude, plan.origin.longitude), level[:, 0].astype(int)
-    track = Track(flight.t, position, velocity, items, np.empty(0), frame)
-    if (use := energy_use(plan, track, plan.wind)) is not None:
+    velocity = np.pad(flight.v, ((0, 0), (0, 1)))
+    if (use := energy_use(plan, flight.t, velocity, plan.wind)) is not None:
         plots += [({"power": use.power}, "W"), ({"energy": use.used}, "Wh")]
     return plots
 

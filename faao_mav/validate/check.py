@@ -76,7 +76,7 @@ def check(
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
 
         link, prediction = compare_with_plan(solution, track)
-        energy = energy_use(solution.plan, track, wind)
+        energy = energy_use(solution.plan, track.t, track.velocity, wind, lands=track.lands)
     airborne = solution is not None and not solution.plan.mission.takeoff
     beside = (track, limits or Limits(), link, airborne, energy)
     findings = validate(ValidationContext(mission, vehicle, *beside))

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Track
 from faao_mav.plan import Plan, Vector
 from faao_mav.plan.energy import Battery
 from faao_mav.power import JOULES_PER_WH
@@ -52,18 +51,20 @@ class EnergyUse:
         }
 
 
-def energy_use(plan: Plan, track: Track, wind: Vector) -> EnergyUse | None:
-    """Return what the flight `track` of the mission of `plan` takes; None without a power model.
+def energy_use(
+    plan: Plan, t: Real, velocity: Real, wind: Vector, *, lands: bool = True
+) -> EnergyUse | None:
+    """Return what a flight of `plan` takes; None without a power model.
 
-    The velocities are those through the air, which moves with `wind`, m/s. The relay's transmit
-    power counts for as long as the flight lasts.
+    Its `velocity` (n, 3), m/s at `t` (n,), s, is that over ground; the air moves with `wind`, m/s.
+    The relay's transmit power counts for as long as the flight lasts.
     """
     model, relay = plan.power_model, plan.radio.relay.power
-    if model is None or len(track.t) < 2:
+    if model is None or len(t) < 2:
         return None
-    air = track.velocity - np.array([*wind, 0.0])
-    power = model(air, np.gradient(air, track.t, axis=0)) + relay
-    steps = np.diff(track.t) * (power[1:] + power[:-1]) / 2
+    air = velocity - np.array([*wind, 0.0])
+    power = model(air, np.gradient(air, t, axis=0)) + relay
+    steps = np.diff(t) * (power[1:] + power[:-1]) / 2
     used = np.concatenate([[0.0], np.cumsum(steps)]) / JOULES_PER_WH
     least = model.least_power(_AIRSPEEDS)[1] + relay
-    return EnergyUse(track.t, power, used, plan.vehicle.battery, track.lands, least)
+    return EnergyUse(t, power, used, plan.vehicle.battery, lands, least)
