@@ -8,7 +8,7 @@ from faao_mav.validate.demands import Stretch as Stretch
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
-from faao_mav.validate.rule import read_rules
+from faao_mav.validate.rule import hits, read_rules
 
 _MODULES = (ardupilot, delivery, extent, fences, items, px4, speeds)
 _CONSTANTS: dict[str, object] = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
@@ -33,7 +33,7 @@ def validate(context: ValidationContext) -> tuple[Finding, ...]:
     vehicle, limits, link = context.vehicle, context.limits, context.link
     shown = {**_CONSTANTS, "vehicle": vehicle, "limits": limits, "link": link}
     found = []
-    for name, index, values in (hit for module in _MODULES for hit in module.checks.hits(context)):
+    for name, index, values in hits(context):
         rule = RULES[_PLACE[name]]
         if rule.applies_to(vehicle):
             found.append(rule.finding(index, shown | context.about(index) | values))

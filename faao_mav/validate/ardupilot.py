@@ -5,9 +5,7 @@ from itertools import pairwise
 
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import ValidationContext, at_zero
-from faao_mav.validate.rule import Checks, Hits, hit
-
-checks = Checks()
+from faao_mav.validate.rule import Hits, checks, hit
 
 _SKIPPED = {
     "copter": (30, 83, 191, 194, 210, 212, 223, 3000),

@@ -2,9 +2,7 @@
 
 from faao_mav.plan.radio_values import doubtful_values
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Checks, Hits, hit
-
-checks = Checks()
+from faao_mav.validate.rule import Hits, checks, hit
 
 GOOD_PERCENT = 99.5
 """The share of what is planned, %, below which something can be won back. Chosen."""

@@ -7,10 +7,8 @@ import numpy as np
 from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Checks, Hits, hit
+from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.validate.straight import HOME, PlacedItem
-
-checks = Checks()
 
 FAR = 10.0
 """The distance from home or from item to item, km, that is hardly meant. Chosen."""

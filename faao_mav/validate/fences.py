@@ -12,13 +12,11 @@ from faao_mav.arrays import Flags
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Checks, Hits, hit
+from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
-
-checks = Checks()
 
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""

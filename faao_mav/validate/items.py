@@ -13,9 +13,7 @@ from faao_mav.mission.command import (
 )
 from faao_mav.mission.item import MissionItem
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
-from faao_mav.validate.rule import Checks, Hits, hit
-
-checks = Checks()
+from faao_mav.validate.rule import Hits, checks, hit
 
 _LANDING_SEQUENCES = (Command.DO_LAND_START, 188)
 _ENDINGS = (*LANDINGS, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM)

@@ -7,10 +7,8 @@ from itertools import pairwise
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero
-from faao_mav.validate.rule import Checks, Hits, hit
+from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.validate.straight import HOME, Straight
-
-checks = Checks()
 
 _CONDITIONS = (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
 

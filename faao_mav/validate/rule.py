@@ -101,23 +101,23 @@ Hits: TypeAlias = Iterable[Hit]
 Checker: TypeAlias = Callable[["ValidationContext"], Hits]
 
 
-class Checks(list[tuple[str | None, str | None, Checker]]):
-    """The checks of one module: an instance decorates the functions that find where rules hold."""
+_CHECKS: list[tuple[str | None, str | None, Checker]] = []
+"""The functions that find where rules hold, each for vehicles of an autopilot and a type."""
 
-    def __call__(
-        self, autopilot: str | None = None, kind: str | None = None
-    ) -> Callable[[Checker], Checker]:
-        """Return a decorator of a check for vehicles of `autopilot` and `kind`, None: all."""
 
-        def register(check: Checker) -> Checker:
-            self.append((autopilot, kind, check))
-            return check
+def checks(autopilot: str | None = None, kind: str | None = None) -> Callable[[Checker], Checker]:
+    """Return a decorator of a check for vehicles of `autopilot` and `kind`, None: all."""
 
-        return register
+    def register(check: Checker) -> Checker:
+        _CHECKS.append((autopilot, kind, check))
+        return check
 
-    def hits(self, context: "ValidationContext") -> Iterator[Hit]:
-        """Yield what the checks about the vehicle of `context` find."""
-        vehicle = context.vehicle
-        for autopilot, kind, check in self:
-            if autopilot in (None, vehicle.autopilot) and kind in (None, vehicle.kind):
-                yield from check(context)
+    return register
+
+
+def hits(context: "ValidationContext") -> Iterator[Hit]:
+    """Yield what all checks about the vehicle of `context` find."""
+    vehicle = context.vehicle
+    for autopilot, kind, check in _CHECKS:
+        if autopilot in (None, vehicle.autopilot) and kind in (None, vehicle.kind):
+            yield from check(context)

@@ -10,10 +10,8 @@ from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Checks, Hits, hit
+from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.validate.straight import HOME, Straight
-
-checks = Checks()
 
 REACHED_PERCENT = 80.0
 """The share of the commanded speed, %, below which a leg is reported. Chosen."""
