@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial, wraps
+from functools import wraps
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from faao_mav.mission.item import Mission
     from faao_mav.optimizer.solution import Observer, Progress, Solution
     from faao_mav.plan import Vector
-    from faao_mav.study import StudyRow
     from faao_mav.wire.link import Observe
 
 
@@ -227,52 +226,34 @@ def planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | N
 
 
 @contextmanager
-def optimizer_progress(*, shown: bool) -> "Iterator[Observer | None]":
-    """Give an observer of the work on a plan."""
-    with _line("BarColumn", "TimeElapsedColumn", "{task.description}", shown=shown) as update:
+def progress(*, shown: bool) -> "Iterator[Observe]":
+    """Give what draws a line on a terminal: what is done, how much of it, of how much (0: open).
 
-        def observe(now: "Progress") -> None:
-            step = f"iteration {now.iteration} of at most {now.max_iterations}"
-            best = f", {now.best_rate:.4f} bit/s/Hz" if now.best_rate else ""
-            update(description=f"{step}: {now.stage}{best}")
-
-        yield observe if shown else None
-
-
-@contextmanager
-def transfer_progress(*, shown: bool) -> "Iterator[Observe | None]":
-    """Give an observer of a transfer to or from a vehicle."""
-    with _line("{task.description}", "BarColumn", "MofNCompleteColumn", shown=shown) as update:
-
-        def observe(what: str, done: int, total: int) -> None:
-            update(description=what, completed=done, total=total or None)
-
-        yield observe if shown else None
-
-
-@contextmanager
-def study_progress(total: int, *, shown: bool) -> "Iterator[Callable[[StudyRow], None] | None]":
-    """Give an observer of the `total` rows of a study."""
-    columns = ("BarColumn", "MofNCompleteColumn", "TimeRemainingColumn", "{task.description}")
-    with _line(*columns, shown=shown) as update:
-        update(total=total, description="")
-        yield (lambda row: update(advance=1, description=row.scheme)) if shown else None
-
-
-@contextmanager
-def _line(*columns: str, shown: bool) -> Iterator[Callable[..., Any]]:
-    """Give what updates the line, if one is `shown`.
-
-    `columns` are names of classes of `rich.progress`, or templates of text.
+    It is on standard error while there is work, if anything is `shown`.
     """
     if not shown:
-        yield lambda **_: None
+        yield lambda *_: None
         return
     from rich import progress
     from rich.console import Console
 
-    made = [
-        progress.TextColumn(name) if "{" in name else getattr(progress, name)() for name in columns
-    ]
-    with progress.Progress(*made, console=Console(stderr=True), transient=True) as line:
-        yield partial(line.update, line.add_task("starting", total=None))
+    columns = ("{task.description}", progress.BarColumn(), progress.TimeElapsedColumn())
+    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as line:
+        task = line.add_task("starting", total=None)
+        yield lambda what, done, total: line.update(
+            task, description=f"{what}, {done} of {total}" if total else what,
+            completed=done, total=total or None,
+        )  # fmt: skip
+
+
+@contextmanager
+def optimizer_progress(*, shown: bool) -> "Iterator[Observer]":
+    """Give an observer of the work on a plan."""
+    with progress(shown=shown) as draw:
+
+        def observe(now: "Progress") -> None:
+            best = f", {now.best_rate:.4f} bit/s/Hz" if now.best_rate else ""
+            steps = f"iteration {now.iteration} of at most {now.max_iterations}"
+            draw(f"{now.stage}{best}, {steps}", 0, 0)
+
+        yield observe

@@ -1,5 +1,6 @@
 """`faao-mission study PLAN.yaml`: one plan with many values, schemes and seeds."""
 
+import itertools
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from faao_mav.cli.shared import AsJson, File, exit_status, note, option, show
+from faao_mav.cli.shared import AsJson, File, exit_status, note, option, progress, show
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -54,7 +55,6 @@ def study(
 
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
-    from faao_mav.cli.shared import study_progress
     from faao_mav.plan import read_plan
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.sections import Study
@@ -89,7 +89,12 @@ def study(
         )
     _check_cases(cases)
     try:
-        with study_progress(len(cases), shown=sys.stderr.isatty()) as observe:
+        with progress(shown=sys.stderr.isatty()) as draw:
+            done = itertools.count(1)
+
+            def observe(row: "StudyRow") -> None:
+                draw(row.scheme, next(done), len(cases))
+
             rows = run_study(cases, jobs=jobs, cluster=cluster, directory=out, observe=observe)
     except KeyboardInterrupt:
         kept = "nothing was kept; give --out DIR to go on where it ended"

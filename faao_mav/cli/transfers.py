@@ -15,9 +15,9 @@ from faao_mav.cli.shared import (
     flag,
     note,
     option,
+    progress,
     read_noted,
     show,
-    transfer_progress,
     with_link,
     write_noted,
 )
@@ -80,7 +80,7 @@ def send(mission: "Mission", to: str, *, shown: bool, **options: Any) -> "Upload
     """Upload a mission and verify it, with progress where that is `shown`; see `upload` there."""
     from faao_mav.wire.client import upload as run
 
-    with transfer_progress(shown=shown) as observe:
+    with progress(shown=shown) as observe:
         report = run(mission, to, observe=observe, **options)
     if not report.verified:
         note("the mission is not verified; do not fly it")
@@ -153,7 +153,7 @@ def download(
 
     check_suffix(out)
     check_writable(out)
-    with transfer_progress(shown=sys.stderr.isatty()) as observe:
+    with progress(shown=sys.stderr.isatty()) as observe:
         held = holdings(source, observe=observe, **link)
     found, mission = held.vehicle, held.mission
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None

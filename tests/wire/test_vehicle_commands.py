@@ -14,7 +14,7 @@ from stations import FENCE, HOME, RALLY, a_mission, vehicle_of
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot
-from faao_mav.cli.shared import transfer_progress
+from faao_mav.cli.shared import progress
 from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
@@ -228,11 +228,15 @@ def test_a_download_without_a_mission_writes_nothing(port: int, tmp_path: Path) 
     assert not out.exists()
 
 
-def test_progress_is_drawn_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
-    with transfer_progress(shown=False) as nothing:
-        assert nothing is None
-    with transfer_progress(shown=True) as observe:
-        assert observe is not None
-        observe("uploading mission", 3, 9)
-        observe("asking for home", 0, 0)
-    assert capsys.readouterr().out == ""
+def test_progress_is_drawn_on_a_terminal_only(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("FORCE_COLOR", "1"), ("COLUMNS", "100")):
+        monkeypatch.setenv(name, value)
+    for shown in (False, True):
+        with progress(shown=shown) as observe:
+            observe("asking for home", 0, 0)
+            observe("uploading mission", 3, 9)
+        drawn = capsys.readouterr()
+        assert drawn.out == ""
+        assert ("uploading mission, 3 of 9" in drawn.err) is shown
