@@ -95,6 +95,9 @@ def check_writable(path: str | Path) -> None:
 PAGES = (".html", ".htm")
 """What the name of a page may end in."""
 
+FIGURES = (".png", ".svg", ".pdf")
+"""What the name of a figure may end in."""
+
 
 def check_ending(path: Path, option: str, endings: Sequence[str] | None) -> None:
     """Raise `InputError` where `option` has a `path` that ends in none of `endings`."""

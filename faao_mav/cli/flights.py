@@ -15,7 +15,7 @@ from faao_mav.cli.shared import (
     Radio,
     SolutionFile,
     System,
-    check_page,
+    check_outputs,
     exit_status,
     flag,
     note,
@@ -185,7 +185,8 @@ def debrief(
     """
     if plan_file is None and solution_file is None:
         raise InputError("--plan or --solution: give the plan that was flown")
-    check_page(report, {"LOG": log, "--plan": plan_file, "--solution": solution_file})
+    inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
+    check_outputs({"--report": report}, inputs)
     from faao_mav import debrief as debriefed
     from faao_mav.fly.radio import Radios
     from faao_mav.report.summary import joined

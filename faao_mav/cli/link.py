@@ -11,7 +11,7 @@ from faao_mav.cli.shared import (
     AsJson,
     File,
     Number,
-    check_page,
+    check_outputs,
     exit_status,
     note,
     option,
@@ -19,7 +19,7 @@ from faao_mav.cli.shared import (
     show,
 )
 from faao_mav.errors import InputError
-from faao_mav.files import check_apart, check_ending, check_writable, read_text, write_whole
+from faao_mav.files import check_ending, read_text, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
@@ -84,9 +84,7 @@ def link(
     inputs: dict[str, Path | None] = {"--rates": rates, **{f"LOG {path}": path for path in logs}}
     if out is not None:
         check_ending(out, "--out", (".yaml", ".yml"))
-        check_writable(out)
-    check_page(report, inputs)
-    check_apart({"--out": out, "--report": report}, inputs)
+    check_outputs({"--out": out, "--report": report}, inputs)
     from faao_mav.radio.fit import fit_link
     from faao_mav.report.link import link_lines, link_page, link_record, link_yaml
     from faao_mav.report.summary import joined

@@ -18,7 +18,7 @@ from faao_mav.cli.shared import (
     SolutionFile,
     Whose,
     check_known,
-    check_page,
+    check_outputs,
     exit_status,
     flag,
     option,
@@ -29,7 +29,7 @@ from faao_mav.cli.shared import (
     write_noted,
 )
 from faao_mav.errors import InputError, printable
-from faao_mav.files import check_apart, check_writable, write_whole
+from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
     from faao_mav.validate import Level, Rule
@@ -94,7 +94,8 @@ def validate(
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"--max-{name} {value:g}: expected a number above 0")
     air = read_wind(wind)
-    check_page(report, {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file})
+    inputs = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
+    check_outputs({"--report": report}, inputs)
     solution = planned(plan_file, solution_file)
     plan = solution.plan if solution is not None else None
     file = read_noted(mission_file)
@@ -145,8 +146,7 @@ def convert(
     check_known(autopilot, None)
     check_readable(mission_file)
     check_suffix(out)
-    check_writable(out)
-    check_apart({"--out": out}, {"MISSION": mission_file})
+    check_outputs({"--out": out}, {"MISSION": mission_file})
     read = read_noted(mission_file)
     kind = kind_by_number(read.vehicle_type) or "copter"
     whose = autopilot or made_for(mission_file, read).autopilot

@@ -11,6 +11,7 @@ from faao_mav.cli.shared import (
     AsJson,
     File,
     System,
+    check_outputs,
     exit_status,
     flag,
     note,
@@ -20,7 +21,6 @@ from faao_mav.cli.shared import (
 )
 from faao_mav.cli.transfers import as_dict, send
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
@@ -128,7 +128,6 @@ def _checked_plan(
 ) -> "Plan":
     """Return the plan; what it asks for and where to is refused before the work if of no use."""
     from faao_mav.plan import read_plan
-    from faao_mav.report.style import FORMATS
     from faao_mav.schedule.conversion import beyond_vehicle, check_vehicle
     from faao_mav.workflow import mission_files
 
@@ -139,17 +138,11 @@ def _checked_plan(
     else:
         plan.aircraft.flight_model()  # what is useless is refused, what is not flown is told
     beside = mission_files(out, plan)[1:] if out is not None else ()
-    endings = {"--save": (".npz",), "--report": PAGES, "--figure": FORMATS}
-    for name, path in files.items():
-        if path is not None:
-            check_ending(path, name, endings.get(name))
-            check_writable(path)
     of_out = {
         f"the {'parameters' if path.suffix.startswith('.param') else 'fence'} of --out,": path
         for path in beside
     }
-    outputs = {"--out": out, **of_out, **files}
-    check_apart(outputs, {"PLAN.yaml": plan_file})
+    check_outputs({"--out": out, **of_out, **files}, {"PLAN.yaml": plan_file})
     if upload is not None:
         from faao_mav.wire.transport import parse_connection
 

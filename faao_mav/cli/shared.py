@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import typer
 
 from faao_mav.errors import FaaoError, InputError
-from faao_mav.files import PAGES, check_apart, check_ending, check_writable
+from faao_mav.files import FIGURES, PAGES, check_apart, check_ending, check_writable
 
 if TYPE_CHECKING:
     from faao_mav.mission.formats import MissionFile, PlanTarget, Rendered
@@ -183,12 +183,17 @@ def write_noted(mission: "Mission", out: Path, target: "PlanTarget | None") -> "
     return written
 
 
-def check_page(report: Path | None, inputs: Mapping[str, Path | None]) -> None:
-    """Raise `InputError` for a --report that cannot be written, or is one of the `inputs`."""
-    if report is not None:
-        check_ending(report, "--report", PAGES)
-        check_writable(report)
-    check_apart({"--report": report}, inputs)
+def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None]) -> None:
+    """Raise `InputError` for an output that cannot be written, or is another file of the command.
+
+    Both are named as the user names them, an option or an argument; None stands for no file.
+    """
+    endings = {"--report": PAGES, "--figure": FIGURES, "--save": (".npz",)}
+    for name, path in outputs.items():
+        if path is not None:
+            check_ending(path, name, endings.get(name))
+            check_writable(path)
+    check_apart(outputs, inputs)
 
 
 def show(

@@ -11,6 +11,7 @@ from faao_mav.cli.shared import (
     AllowArmed,
     AsJson,
     File,
+    check_outputs,
     exit_status,
     flag,
     note,
@@ -147,12 +148,11 @@ def download(
     """
     from faao_mav.autopilot import Vehicle
     from faao_mav.autopilot.files import plan_target
-    from faao_mav.files import check_writable
     from faao_mav.mission.formats import check_suffix
     from faao_mav.wire.client import holdings
 
     check_suffix(out)
-    check_writable(out)
+    check_outputs({"--out": out}, {})
     with progress(shown=sys.stderr.isatty()) as observe:
         held = holdings(source, observe=observe, **link)
     found, mission = held.vehicle, held.mission

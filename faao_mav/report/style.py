@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from faao_mav.files import check_ending, write_whole
+from faao_mav.files import FIGURES, check_ending, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,9 +28,6 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 WIDTH = 4.2
 """Inches: a page makes a figure as wide as a phone, where 9 points must still be read."""
-
-FORMATS = (".png", ".svg", ".pdf")
-"""What the name of a figure may end in."""
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
@@ -150,7 +147,7 @@ def render(figure: "Figure", suffix: str) -> bytes:
 def save_figure(figure: "Figure", path: str | Path) -> None:
     """Write `figure` to `path`, whole or not at all, in the format of its ending."""
     path = Path(path)
-    check_ending(path, "figure", FORMATS)
+    check_ending(path, "figure", FIGURES)
     write_whole(path, render(figure, path.suffix))
 
 
