@@ -187,14 +187,17 @@ def debrief(
         raise InputError("--plan or --solution: give the plan that was flown")
     inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     check_outputs({"--report": report}, inputs)
-    from faao_mav import debrief as debriefed
+    from faao_mav.fly.logs import read_log
     from faao_mav.fly.radio import Radios
+    from faao_mav.report.debrief import FromLog
     from faao_mav.report.summary import joined
+    from faao_mav.workflow import Result, with_mission
 
+    records = read_log(log, system)  # what is no log is refused before the plan is solved
     solution = planned(plan_file, solution_file)
     assert solution is not None
     radios = None if radio is None else Radios(solution, radio)
-    told = debriefed(log, solution, system)
+    told = FromLog.of(records, with_mission(Result(solution)), str(log))
     if report is not None:
         from faao_mav.report.page import render_report
 
