@@ -21,10 +21,8 @@ class Parameter:
     angles in radians; "" for switches, bits and gains. `names` are the autopilot's own names, the
     newest generation first, each with the factor that turns its number into `unit`: a vehicle
     knows one generation, a parameter file may carry both. Values outside `least` to `greatest` are
-    no use (of a parameter of `either_sign`: their size); `documented` is the narrower range of the
-    autopilot's documentation, if recommended values have to stay in it. The autopilot lowers the
-    value to that of the parameter `capped_by`. `motion`: it shapes how the vehicle flies a mission;
-    the others decide about checks, storage, fence and return.
+    no use (of a parameter of `either_sign`: their size). The autopilot lowers the value to that of
+    the parameter `capped_by`. `motion`: it shapes how the vehicle flies a mission; the others decide about checks, storage, fence and return.
 
     >>> speed = Parameter("cruise_speed", "m/s", 10.0, {"WP_SPD": 1.0, "WPNAV_SPEED": 0.01})
     >>> speed.name_in({"WPNAV_SPEED": 750})
@@ -40,7 +38,6 @@ class Parameter:
     least: float = -math.inf
     greatest: float = math.inf
     either_sign: bool = False
-    documented: tuple[float, float] = (-math.inf, math.inf)
     capped_by: str = ""
     motion: bool = True
 
@@ -137,11 +134,13 @@ def rule(
 class Recommended:
     """The parameters that are recommended for a plan; measured: about 130 flights.
 
-    `curved`, m/s², is the acceleration for corners and short legs at speed, `others` are more
-    parameters by their keys. In one more set, for bends at speed, they are the `liveliest`.
+    `curved`, m/s², is the acceleration for corners and short legs at speed, `documented` between
+    which it may be by the autopilot's documentation, and `others` are more parameters by their
+    keys. In one more set, for bends at speed, they are the `liveliest`.
     """
 
     curved: float
+    documented: tuple[float, float]
     others: Mapping[str, float] = field(default_factory=dict)
     liveliest: Mapping[str, float] = field(default_factory=dict)
 
@@ -153,7 +152,7 @@ class Recommended:
         `speeds`, m/s, are the greatest of the plan and the greatest that is commanded. Names are
         those of both generations: a vehicle takes those that it knows.
         """
-        low, high = table["acceleration"].documented
+        low, high = self.documented
         wanted = (*(share * max_acceleration for share in _GENTLE), self.curved)
         tries = sorted({round(min(max(each, low), high), 2) for each in wanted})
         tried = [(each, self.others) for each in tries]

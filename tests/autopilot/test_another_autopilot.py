@@ -106,7 +106,7 @@ COPTER = VehicleType(
         speed_change=lambda item: SpeedChange("horizontal", item.params[1]),
     ),
     flight_model=model,
-    recommendation=Recommended(5.0),
+    recommendation=Recommended(5.0, (0.5, 6.0)),
 )
 
 PLAN = edited(

@@ -171,7 +171,9 @@ PX4_COPTER = VehicleType(
     fastest=_FASTEST,
     flight_model=Px4.from_vehicle,
     recommendation=Recommended(
-        5.0, {"jerk": 20.0, "error_limit": _ERROR_LIMIT, "height_radius": _HEIGHT_RADIUS}
+        5.0,
+        (2.0, 15.0),
+        {"jerk": 20.0, "error_limit": _ERROR_LIMIT, "height_radius": _HEIGHT_RADIUS},
     ),
     ceilings={"max_speed": ("max_speed",), "max_acceleration": ("lean_angle", "acceleration")},
     body=PX4_BODY,

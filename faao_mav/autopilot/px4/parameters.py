@@ -34,7 +34,7 @@ class Px4Limits(Model):
 
     cruise_speed: float = parameter("m/s", 5.0, "MPC_XY_CRUISE", capped_by="max_speed")
     max_speed: float = parameter("m/s", 12.0, "MPC_XY_VEL_MAX")
-    acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_HOR", documented=(2.0, 15.0))
+    acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_HOR")
     jerk: float = parameter("m/s^3", 4.0, "MPC_JERK_AUTO")
     corner_gain: float = parameter("1/s", 0.5, "MPC_XY_TRAJ_P", least=0.01)
     error_limit: float = parameter("m", 2.0, "MPC_XY_ERR_MAX")

@@ -29,7 +29,7 @@ class ArduCopterLimits(Model):
     cruise_speed: float = parameter("m/s", 10.0, "WP_SPD", "WPNAV_SPEED")
     climb_speed: float = parameter("m/s", 2.5, "WP_SPD_UP", "WPNAV_SPEED_UP")
     descent_speed: float = parameter("m/s", 1.5, "WP_SPD_DN", "WPNAV_SPEED_DN")
-    acceleration: float = parameter("m/s^2", 2.5, "WP_ACC", "WPNAV_ACCEL", documented=(0.5, 5.0))
+    acceleration: float = parameter("m/s^2", 2.5, "WP_ACC", "WPNAV_ACCEL")
     climb_acceleration: float = parameter("m/s^2", 1.0, "WP_ACC_Z", "WPNAV_ACCEL_Z")
     corner_acceleration: float = parameter("m/s^2", 0.0, "WP_ACC_CNR", "WPNAV_ACCEL_C", least=0.0)
     jerk: float = parameter("m/s^3", 1.0, "WP_JERK", "WPNAV_JERK", 1.0)
