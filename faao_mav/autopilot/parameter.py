@@ -22,7 +22,8 @@ class Parameter:
     newest generation first, each with the factor that turns its number into `unit`: a vehicle
     knows one generation, a parameter file may carry both. Values outside `least` to `greatest` are
     no use (of a parameter of `either_sign`: their size). The autopilot lowers the value to that of
-    the parameter `capped_by`. `motion`: it shapes how the vehicle flies a mission; the others decide about checks, storage, fence and return.
+    the parameter `capped_by`. `motion`: it shapes how the vehicle flies a mission; the others
+    decide about checks, storage, fence and return.
 
     >>> speed = Parameter("cruise_speed", "m/s", 10.0, {"WP_SPD": 1.0, "WPNAV_SPEED": 0.01})
     >>> speed.name_in({"WPNAV_SPEED": 750})

@@ -14,7 +14,7 @@ from faao_mav.autopilot.parameter import ParameterValues, rule
 from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse
 from faao_mav.geodesy import LocalFrame
 
-DEGREE = 111_318.84502145034
+_DEGREE = 111_318.84502145034
 """ArduPilot's degree of latitude, m; times the cosine of the latitude one of longitude."""
 
 
@@ -34,11 +34,11 @@ class FlatFrame(LocalFrame):
         """Return positions (..., 2) in metres."""
         lat, turned = np.asarray(latitude, dtype=float), np.asarray(longitude) - self.longitude
         east = self._shrunk(lat) * ((turned + 180) % 360 - 180)
-        return DEGREE * np.stack([east, lat - self.latitude], axis=-1)
+        return _DEGREE * np.stack([east, lat - self.latitude], axis=-1)
 
     def to_geodetic(self, positions: ArrayLike) -> tuple[Real, Real]:
         """Return latitude and longitude in degrees."""
-        east, north = np.moveaxis(np.asarray(positions, dtype=float) / DEGREE, -1, 0)
+        east, north = np.moveaxis(np.asarray(positions, dtype=float) / _DEGREE, -1, 0)
         lat = self.latitude + north
         return lat, (self.longitude + east / self._shrunk(lat) + 180) % 360 - 180
 

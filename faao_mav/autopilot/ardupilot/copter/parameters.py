@@ -7,11 +7,12 @@ import math
 from dataclasses import dataclass, replace
 from typing import Self
 
-from faao_mav.autopilot.ardupilot import DEGREE, SHARED
+from faao_mav.autopilot.ardupilot import SHARED, FlatFrame
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, row, rule, table
 from faao_mav.autopilot.vehicle_type import lean_acceleration
+from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
 
 _LEAST_INPUT_TIME = 0.1
@@ -97,7 +98,6 @@ TABLE = table(
 
 def _metres(latitude: float) -> tuple[float, float]:
     """The autopilot's metres per metre of WGS84 at `latitude` degrees, east and north."""
-    a, e2 = 6_378_137.0, 6.69437999014e-3
-    w = 1 - e2 * math.sin(math.radians(latitude)) ** 2
-    degree = math.pi / 180 * a / math.sqrt(w)
-    return DEGREE / degree, DEGREE * w / (degree * (1 - e2))
+    there = LocalFrame(latitude, 0.0).to_geodetic([1.0, 1.0])
+    east, north = FlatFrame(latitude, 0.0).to_local(*there).tolist()
+    return east, north
