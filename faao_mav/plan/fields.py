@@ -80,13 +80,8 @@ Whole: TypeAlias = Annotated[int, Strict()]
 Flag: TypeAlias = Annotated[bool, Strict()]
 
 
-def _one_line(text: str) -> str:
-    if not text.isprintable():
-        raise PydanticCustomError("not_printable", "has characters that move a terminal's cursor")
-    return text
-
-
-Text: TypeAlias = Annotated[str, Strict(), AfterValidator(_one_line)]
+Text: TypeAlias = Annotated[str, Strict(), Field(pattern=r"^( |[^\p{C}\p{Z}])*$")]
+"""Text in one line, without characters that move a terminal's cursor."""
 
 
 @dataclass(frozen=True, slots=True)
