@@ -252,6 +252,9 @@ def test_clearing_over_a_bad_link() -> None:
             (report,) = script.outcome
             assert report.verified
             assert mock.lists.items(MissionType.RALLY) == ()
+    dead: Any = Script(clear_lists([FENCES, MissionType.RALLY], peer_of("px4")))
+    simulate(Station(dead, GROUND_STATION), Station(mock_of("px4"), VEHICLE), Faults(loss=1.0))
+    assert [report.verdict for report in dead.outcome] == ["silent"]
 
 
 def test_the_same_seed_gives_the_same_link() -> None:
