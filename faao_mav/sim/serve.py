@@ -20,7 +20,7 @@ def serve(
     faults: Faults | None = None,
     key: bytes | None = None,
     stop: Callable[[], bool] = lambda: False,
-    observe: Callable[[MockAutopilot], object] | None = None,
+    observe: Callable[[MockAutopilot], object] = lambda _: None,
 ) -> None:
     """Run `mock` on `transport` until `stop()`; `observe` is shown it after every step."""
     if faults is not None:
@@ -30,5 +30,4 @@ def serve(
         link.begin(mock)
         while not stop():
             link.step(mock, time.monotonic() + _PATIENCE)
-            if observe is not None:
-                observe(mock)
+            observe(mock)
