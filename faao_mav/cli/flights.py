@@ -25,7 +25,7 @@ from faao_mav.cli.shared import (
     show,
     with_link,
 )
-from faao_mav.errors import FaaoError, InputError
+from faao_mav.errors import InputError
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
@@ -153,14 +153,13 @@ def _flight(
 
 def _predicted(flight: "Flight") -> "Track | None":
     """Return the predicted flight of the mission; None, which is noted, if there is none."""
-    from faao_mav.autopilot.predict import predict
+    from faao_mav.validate.check import predicted
 
     wind = flight.solution.plan.wind if flight.solution is not None else (0.0, 0.0)
-    try:
-        return predict(flight.mission, flight.vehicle, wind=wind)
-    except FaaoError as error:
-        note(f"the flight is not predicted: {error}")
-        return None
+    track, reason = predicted(flight.mission, flight.vehicle, wind)
+    if track is None:
+        note(f"the flight is not predicted: {reason}")
+    return track
 
 
 @exit_status()

@@ -15,7 +15,7 @@ from faao_mav.autopilot.manners import FenceAction
 from faao_mav.fly.seen import Flight, Held, read_held
 from faao_mav.fly.telemetry import Telemetry
 from faao_mav.validate import Limits
-from faao_mav.validate.check import Check, check
+from faao_mav.validate.check import Check, check, predicted
 from faao_mav.validate.lean import beyond_lean
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.words import counted
@@ -208,7 +208,7 @@ def _timing(flight: Flight, held: Held, seen: Telemetry, judged: Check) -> Itera
 def _lateness(flight: Flight, judged: Check) -> str:
     """Return how long the flight takes with the parameters of both, as the end of a sentence."""
     own = replace(judged.vehicle, parameters=flight.vehicle.parameters).usable()
-    meant = check(judged.mission, own, wind=judged.wind).track
+    meant, _ = predicted(judged.mission, own, judged.wind)
     if judged.track is None or meant is None:
         return ""
     return f"; predicted to take {judged.track.t[-1]:.1f} s, not {meant.t[-1]:.1f} s"

@@ -70,7 +70,7 @@ def check(
     """
     if wind is None:
         wind = solution.plan.wind if solution is not None else (0.0, 0.0)
-    track, unpredicted = _track(mission, vehicle, wind)
+    track, unpredicted = predicted(mission, vehicle, wind)
     link = prediction = energy = None
     if solution is not None and track is not None:
         from faao_mav.validate.comparison import compare_with_plan  # the radio's code
@@ -83,7 +83,7 @@ def check(
     return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy, prediction)
 
 
-def _track(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:
+def predicted(mission: Mission, vehicle: Vehicle, wind: Vector) -> tuple[Track | None, str]:
     """Return the predicted flight, or None and why there is none."""
     from faao_mav.autopilot.predict import predict
 
