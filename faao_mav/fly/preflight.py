@@ -16,8 +16,8 @@ from faao_mav.fly.seen import Flight, Held, read_held
 from faao_mav.fly.telemetry import Telemetry
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check, predicted
-from faao_mav.validate.lean import beyond_lean
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
+from faao_mav.validate.speeds import beyond_lean
 from faao_mav.validate.words import counted
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Envelope, Message

@@ -3,15 +3,22 @@
 import math
 from collections.abc import Iterator
 from itertools import groupby, pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from faao_mav.autopilot.vehicle_type import OVERSPEED
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.body import CopterBody
+from faao_mav.autopilot.vehicle_type import OVERSPEED, lean_acceleration
 from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.validate.straight import HOME, Straight
+from faao_mav.vector import lengths
+
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
 
 REACHED_PERCENT = 80.0
 """The share of the commanded speed, %, below which a leg is reported. Chosen."""
@@ -42,6 +49,9 @@ PX4."""
 
 _SLOW = 3.0
 """The commanded speed, m/s, up to which corners hardly matter. Chosen."""
+
+_MISSING = 0.1
+"""m/s that are missing for want of lean from which on it is told: rounding is less. Chosen."""
 
 _CLIMB_SHARE = 0.8
 """The share of the climbing time that the way over ground may fall short to: less, and the leg is
@@ -91,6 +101,32 @@ def _lean(context: ValidationContext) -> Hits:
     if fastest > top:
         angle, name = context.parameter("lean_angle")
         yield hit("speed-lean", -k, speed=fastest, top=top, angle=math.degrees(angle), name=name)
+
+
+def beyond_lean(solution: "Solution", vehicle: Vehicle) -> str | None:
+    """Return in words how `solution` asks `vehicle` to lean further than it may; None: not at all.
+
+    At the velocity v through the air and the acceleration a it leans by
+
+        tan(lean) = |a + (c_1 + c_2 |v|) v| / g,
+
+    with the drag of its body. Without a model with drag nothing is known to lack.
+    """
+    body = vehicle.airframe
+    if not isinstance(body, CopterBody) or not vehicle.type.models_wind:
+        return None
+    v = solution.v - solution.plan.wind
+    drag = (body.linear_drag + body.quadratic_drag * lengths(v)[:, None]) * v
+    push = np.maximum(*(lengths(solution.a[:-1] + each) for each in (drag[:-1], drag[1:])))
+    allowed, slot = vehicle.value("lean_angle"), float(solution.t[1])
+    missing = np.maximum(push - lean_acceleration(allowed), 0.0)
+    if slot * missing.sum() < _MISSING:
+        return None
+    return (
+        f"the plan asks for a lean of up to {math.degrees(math.atan(push.max() / GRAVITY)):.0f} "
+        f"degrees against the drag of vehicle.body, and for {slot * (missing > 0).sum():.1f} s of "
+        f"more than the {math.degrees(allowed):.0f} that its parameters allow: it falls behind"
+    )
 
 
 @checks(kind="copter")

@@ -6,7 +6,7 @@ import numpy as np
 from conftest import FLYABLE, edited
 
 from faao_mav import optimize, parse_plan
-from faao_mav.validate.lean import beyond_lean
+from faao_mav.validate.speeds import beyond_lean
 
 
 def test_drag_and_acceleration_add_up() -> None:
