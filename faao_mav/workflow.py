@@ -30,6 +30,7 @@ from faao_mav.optimizer.pricing import (
     price,
     saturation,
 )
+from faao_mav.optimizer.shadowing import Shadowed, shadowed
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
@@ -77,7 +78,8 @@ class Result:
 
     `information` is the mutual information along the solution, bit/s/Hz; `fresh` the rates on
     fading that was not planned on, None unless the plan averages over fading; `saturation` says
-    whether the alphabet limits the rate, `bound` estimates what no route can exceed, if asked for.
+    whether the alphabet limits the rate, `bound` estimates what no route can exceed, if asked for;
+    `shadowed` tells what arrives under shadowing, where its spread is known.
     `seconds_optimize` is the time of the optimiser, `seconds_total` that of everything, in seconds.
     """
 
@@ -86,6 +88,7 @@ class Result:
     fresh: FreshRates | None = None
     saturation: Saturation | None = None
     bound: "Bound | None" = None
+    shadowed: Shadowed | None = None
     conversion: Conversion | None = None
     prediction: Prediction | None = None
     check: Check | None = None
@@ -189,6 +192,7 @@ class Result:
             "upper_bound": self.bound.value if self.bound else None,
             "upper_bound_exact": self.bound.exact if self.bound else None,
             "goal": _goal_as_dict(solution),
+            "shadowing": asdict(self.shadowed) if self.shadowed else None,
             "starts": dict(solution.starts),
             "iterations": solution.iterations,
             "converged": solution.converged,
@@ -335,6 +339,7 @@ def plan_mission(plan: Plan, *, bound: bool = False, observe: Observer | None = 
         result,
         fresh=fresh_rates(solution),
         saturation=saturation(solution),
+        shadowed=shadowed(solution),
         bound=ceiling,
         seconds_total=time.perf_counter() - started,
     )

@@ -13,6 +13,7 @@ starts, and several times quicker.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -38,6 +39,8 @@ from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
 from faao_mav.optimizer.search.ways import starts_inside
+from faao_mav.optimizer.shadowing import TOLLS, tolled, worth
+from faao_mav.optimizer.shadowing import known as known_spread
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
 _LONG_SEARCH = 6
@@ -51,6 +54,9 @@ and 3 antennas and known draws, three seeds: without them the rates are 1 % lowe
 _WIDTHS = (1.5, 0.5)
 """Decibels over which steps of a radio's own rates rise in the last searches. Chosen: of a step
 that is flown at, half of the last keeps the aircraft on it, 3 % of the distance."""
+
+_TOLLED_ITERATIONS = 40
+"""Iterations of a flight under shadowing, at most. Chosen."""
 
 ROUGH = 1e-3
 """The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared.
@@ -127,6 +133,8 @@ def direct(
     if problem.plan.radio.rates is not None:
         start = replace(best, trajectory=flights[int(values.argmax())])
         best = _sharpened(problem, scheme, [*optima, start], steps)
+    if known_spread(problem):
+        best = _under_shadowing(problem, field, best, steps)
     flight, precoders, error = _at_exact_rates(problem, scheme, field, best)
     residual = f"stationary to {best.residual:.1e}"
     solution = make_solution(
@@ -140,6 +148,8 @@ def direct(
     )
     reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
     history = np.maximum.accumulate([values[0], *values[len(routes) :]]) - error
+    if known_spread(problem):  # without it another flight may have more
+        history = np.minimum(history, reached)
     return replace(
         solution,
         history=np.append(history, reached),
@@ -219,6 +229,30 @@ def _sharpened(
     return found[int(np.argmax(worth))]
 
 
+def _under_shadowing(
+    problem: Problem, field: RateField, optimum: LocalOptimum, max_iterations: int
+) -> LocalOptimum:
+    """Return the best under shadowing of `optimum` and of those that stay less about one place."""
+    begin = optimum.trajectory
+    rates = partial(field.value, begin.w.T)
+    others = [
+        maximize(
+            problem.kinematics,
+            tolled(problem, field, begin.w, rates, z),
+            begin,
+            constraints=problem.constraints(problem.kinematics),
+            tolerance=ROUGH,
+            max_iterations=min(max_iterations, _TOLLED_ITERATIONS),
+            strategy=WARM_START,
+            relay=problem.maximised_queue,
+        )
+        for z in TOLLS
+    ]
+    found = [optimum, *others]
+    flights = [each.trajectory.w for each in found]
+    return found[int(np.argmax([worth(problem, w, partial(field.value, w.T)) for w in flights]))]
+
+
 def _at_exact_rates(
     problem: Problem, scheme: Design, field: RateField, optimum: LocalOptimum
 ) -> tuple[Trajectory, list[Complex], float]:
@@ -236,6 +270,8 @@ def _at_exact_rates(
     reached = _worth(problem, flight.w, precoders)
     told = scheme.gaussian or problem.plan.radio.rates is not None
     error = 0.0 if told else optimum.value - reached
+    if known_spread(problem):  # whose value is that under shadowing
+        return flight, precoders, 0.0
     cutoff = problem.plan.optimizer.rate == "cutoff"
     if not cutoff or all(not isinstance(rate, TableRate) or rate.exact for rate in field.rates):
         return flight, precoders, error

@@ -146,6 +146,12 @@ def _rates(plan: PlanContents) -> Iterator[str]:
 
 def _gain(plan: PlanContents) -> Iterator[str]:
     radio, height = plan.radio, plan.flight.altitude
+    if radio.reliability is not None:
+        told = f"radio.reliability: {radio.reliability:g}: "
+        if all(law.spread_db is None for law in radio.gain_laws):
+            yield f"{told}how far gains are off their law is missing; give radio.gain.spread_db"
+        if plan.optimizer.method == "algorithm1":
+            yield f"{told}algorithm1 (optimizer.method) knows no shadowing; give method direct"
     own = {"base_station": radio.base_station.gain, "ground_user": radio.ground_user.gain}
     for law, name in zip(radio.path_gains, own, strict=True):
         at = law.best_distance(2 * MAX_LOCAL_DISTANCE, height)

@@ -132,6 +132,11 @@ class Radio:
         accepted=_GAIN_FILE,
         default_factory=GainLaw,
     )
+    reliability: Number | None = key(
+        "Share of shadowings in which at least what is maximised arrives; null: plan for the mean.",
+        "[0.5, 0.99]",
+        default=None,
+    )
     rician_factor: Number = key("Rician factor K, linear.", "[0, 1e6]", default=3.0)
     line_of_sight: LineOfSight = key(
         "ula: half-wavelength arrays along east, follows the aircraft; all_ones: ones.",

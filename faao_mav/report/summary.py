@@ -93,6 +93,14 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     told = _told_rate(delivered, radio.bandwidth_mhz) + _megabytes(plan.megabytes(delivered))
     shared = "in half duplex " if half else ""
     yield "delivered", f"{told}; {shared}{100 * share:.2f} % of R_avg"
+    if (under := result.shadowed) is not None:
+        arrives = under.quantiles
+        told = f"{_told_rate(arrives[0.1], radio.bandwidth_mhz)} or more arrives in nine of ten "
+        told += f"shadowings, {arrives[0.5]:.4f} in half of them, {under.mean:.4f} in the mean"
+        yield "shadowing", told
+        if (kept := radio.reliability) is not None:
+            least = arrives[round(1 - kept, 9)]
+            yield "", f"planned for what arrives in {100 * kept:g} % of them: {least:.4f} bit/s/Hz"
     if (information := result.information) is not None:
         told = f"mutual information {information.average:.3f} +- {information.error:.1g}"
         yield "information", f"{told}, {information.delivered:.3f} delivered"

@@ -12,6 +12,7 @@ from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
+from faao_mav.radio.gain import PER_DB
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,12 +22,12 @@ class RateField:
     links: tuple[Link, ...]
     rates: tuple[RateModel, ...]
 
-    def value(self, w: Real) -> Real:
-        """Return the rates (2, ..., n) at positions w (2, ..., n), bits."""
+    def value(self, w: Real, db: float = 0.0) -> Real:
+        """Return the rates (2, ..., n) at positions w (2, ..., n), bits, of gains `db` higher."""
         rates = []
         for link, rate in zip(self.links, self.rates, strict=True):
             at = link_coordinates(link, w)
-            rates.append(rate.value(at.gain_log, at.cosine))
+            rates.append(rate.value(at.gain_log + PER_DB * db, at.cosine))
         return np.stack(rates)
 
     def __call__(self, w: Real) -> StageValues:

@@ -1,0 +1,173 @@
+"""Shadowing about the law of the gain: what arrives under it, and flights that it harms less.
+
+Shadowing is a Gaussian field over the places of the aircraft for each hop, independent of the
+other's: X dB of standard deviation sigma (`spread_db`) and correlation exp(-r / D) at a distance r
+(`correlation_m`). The mean rate of a hop is the less certain the longer the aircraft stays about
+one place. To first order the variance of what arrives is
+
+    V = sum_j sigma_j^2 sum_nm a_jn a_jm exp(-|w_n - w_m| / D_j),  a_jn = weight_j / N dI_jn / dX
+
+A flight for the quantile z standard deviations below the mean pays a toll for each slot, by which
+V falls to first order: its own a_jn times the sum over all others at their places before.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
+from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.rates.spline import Spline
+from faao_mav.optimizer.solution import Solution
+
+SHADOWINGS, _COMPARED = 400, 200
+"""Shadowings of which quantiles are told, with an error of 7 % of the standard deviation, and by
+which flights are compared. Chosen."""
+
+_WAVES = 64
+"""Waves of which a field is the sum. Chosen."""
+
+_REACH, _OFFSETS = 4.0, 25
+"""Standard deviations, and points between, at which rates are known; linear between. Chosen."""
+
+_TINY = 1e-12
+"""A rate, bit/s/Hz, and a variance that count as none."""
+
+_CELLS = 64
+"""Points along each side of the map of a toll, at most. Chosen."""
+
+_PLACES = 1000
+"""Places of the flight before that make a toll, at most. Chosen."""
+
+_ROUND = 0.25
+"""Part of D over which the correlation of a toll is rounded at its peak. Chosen."""
+
+
+Rates: TypeAlias = Callable[[float], Real]
+"""The rates of both hops (2, n), bits, where all gains are so many dB above the law."""
+
+TOLLS = (0.25, 0.5, 0.9, 1.4)
+"""Standard deviations below the mean that flights are sought for. Chosen: of copters over 100 to
+400 m, with 6 dB and D of 25 and 50 m, the best at nine of ten is the third, in the mean the first
+or none."""
+
+
+def known(problem: Problem) -> bool:
+    """Return whether the plan says of a hop how far it is off its law."""
+    return any(law.spread_db is not None for law in problem.plan.radio.gain_laws)
+
+
+def shadows(problem: Problem, w: Real, count: int = SHADOWINGS) -> Iterator[Real]:
+    """Yield shadowings of both hops at positions w (n, 2), dB, (2, n) each; by the plan's seed.
+
+    A wave number with the spectrum of exp(-r / D) is a Gaussian over the size of another.
+    """
+    laws = problem.plan.radio.gain_laws
+    spread = np.array([[law.spread_db or 0.0] for law in laws]) * np.sqrt(2 / _WAVES)
+    rng = np.random.default_rng([problem.plan.radio.seed, 2])
+    for _ in range(count):
+        found = np.empty((2, len(w)))
+        for hop, law in enumerate(laws):
+            size = np.abs(rng.standard_normal((_WAVES, 1))) * law.correlation_m
+            waves = rng.standard_normal((_WAVES, 2)) / size
+            phases = rng.uniform(0, 2 * np.pi, (_WAVES, 1))
+            found[hop] = np.cos(waves @ w.T + phases).sum(axis=0)
+        yield spread * found
+
+
+def outcomes(problem: Problem, w: Real, rates: Rates, count: int = SHADOWINGS) -> Real:
+    """Return what arrives under each of `count` of the `shadows` at w (n, 2), bit/s/Hz."""
+    most = _REACH * max(law.spread_db or 0.0 for law in problem.plan.radio.gain_laws)
+    table, now = np.array([rates(db) for db in np.linspace(-most, most, _OFFSETS)]), rates(0.0)
+    shares = problem.relay.best_shares(now[0], now[1], problem.kinematics.time_step)
+    hop, slot, found = np.arange(2)[:, None], np.arange(len(w)), []
+    for shadow in shadows(problem, w, count):
+        place = np.clip((shadow / most + 1) / 2, 0, 1) * (_OFFSETS - 1)
+        below = np.minimum(place.astype(np.intp), _OFFSETS - 2)
+        low, high = table[below, hop, slot], table[below + 1, hop, slot]
+        found.append(_arrives(problem, low + (place - below) * (high - low), shares))
+    return np.array(found)
+
+
+def _arrives(problem: Problem, rates: Real, shares: Real | None = None) -> float:
+    """Return what the plan maximises of `rates` (2, n), bit/s/Hz, with these or the best shares."""
+    if (queue := problem.maximised_queue) is None:
+        return float(rates.mean(axis=1).min())
+    return queue.relayed(rates[0], rates[1], problem.kinematics.time_step, shares).rate
+
+
+@dataclass(frozen=True, slots=True)
+class Shadowed:
+    """What arrives under shadowing, bit/s/Hz: the mean, and quantiles by their probability."""
+
+    mean: float
+    quantiles: Mapping[float, float]
+
+
+def shadowed(solution: Solution) -> Shadowed | None:
+    """Return what arrives of a solution with its precoders; None where no spread is known."""
+    if not known(solution.problem):
+        return None
+    found = outcomes(
+        solution.problem,
+        solution.w,
+        lambda db: np.array(solution.recomputed_slots(10 ** (db / 10))),
+    )
+    reliability = solution.plan.radio.reliability
+    told = sorted({0.1, 0.5, 0.9} | ({round(1 - reliability, 9)} if reliability else set()))
+    quantiles = dict(zip(told, np.quantile(found, told).tolist(), strict=True))
+    return Shadowed(float(found.mean()), quantiles)
+
+
+def worth(problem: Problem, w: Real, rates: Rates) -> float:
+    """Return what the plan wants of the `outcomes`: their mean, or `radio.reliability`'s part."""
+    reliability = problem.plan.radio.reliability
+    found = outcomes(problem, w, rates, _COMPARED)
+    return float(found.mean() if reliability is None else np.quantile(found, 1 - reliability))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tolled:
+    """The rates of `stage` less `factors` (2, n) times what `maps` rise from `before` (2, n)."""
+
+    stage: Stage
+    factors: Real
+    maps: tuple[Spline, Spline]
+    before: Real
+
+    def __call__(self, w: Real) -> StageValues:
+        """Return rewards, gradients and Hessians at positions w (2, ..., n)."""
+        at = self.stage(w)
+        value, gradient, hessian = at.value.copy(), at.gradient.copy(), at.hessian.copy()
+        for j, each in enumerate(self.maps):
+            f, f_x, f_y, f_xx, f_xy, f_yy = each.by_both(w[0], w[1])
+            value[j] = np.maximum(0.0, value[j] - self.factors[j] * (f - self.before[j]))
+            gradient[:, j] -= self.factors[j] * np.stack([f_x, f_y])
+            hessian[:, j] -= self.factors[j] * np.stack([f_xx, f_xy, f_yy])
+        return StageValues(value, gradient, hessian)
+
+
+def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> Tolled:
+    """Return `stage` with the toll of a flight at w (n, 2) for z standard deviations."""
+    now, slopes = rates(0.0), rates(0.5) - rates(-0.5)
+    less = [_arrives(problem, now * np.array(part)) for part in ([[0.99], [1]], [[1], [0.99]])]
+    lost = np.maximum(_TINY, _arrives(problem, now) - np.array(less))
+    a = slopes * (lost / lost.sum())[:, None] / len(w)
+    laws, every = problem.plan.radio.gain_laws, -(-len(w) // _PLACES)
+    far = 2 * max(law.correlation_m for law in laws)
+    x, y = (np.linspace(each.min() - far, each.max() + far, _CELLS) for each in w.T)
+    places, maps, variance = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1), [], _TINY
+    for law, each in zip(laws, a, strict=True):
+        variances = (law.spread_db or 0.0) ** 2 * each
+        rounded = max(_ROUND * law.correlation_m, x[1] - x[0], y[1] - y[0])
+        felt = np.zeros(places.shape[:2])
+        for place, part in zip(w[::every], variances[::every], strict=True):
+            away = np.sqrt(np.sum((places - place) ** 2, axis=-1) + rounded**2)
+            felt += every * part * np.exp(-away / law.correlation_m)
+        maps.append(Spline.through(x, y, felt))
+        variance += float(each @ maps[-1].value(*w.T))
+    before = np.stack([each.value(*w.T) for each in maps])
+    return Tolled(stage, z * slopes / np.sqrt(variance), (maps[0], maps[1]), before)
