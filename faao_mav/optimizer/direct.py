@@ -25,7 +25,6 @@ from faao_mav.optimizer.interior.maximize import (
     constraints_of,
     feasible,
     maximize,
-    maximize_all,
     objectives,
 )
 from faao_mav.optimizer.interior.search import WARM_START
@@ -115,16 +114,19 @@ def direct(
     if told:  # what is reported are the rates of the alphabet, or the steps themselves
         values = np.array([_worth(problem, f.w, _designed(problem, scheme, f.w)) for f in flights])
     tell(2, "the best start", float(values.max()))
-    optima = maximize_all(
-        kin,
-        field,
-        going,
-        constraints=problem.constraints(kin),
-        tolerance=options.tolerance,
-        max_iterations=steps,
-        strategy=strategy,
-        relay=relay,
-    )
+    optima = [
+        maximize(
+            kin,
+            field,
+            start,
+            constraints=problem.constraints(kin),
+            tolerance=options.tolerance,
+            max_iterations=steps,
+            strategy=strategy,
+            relay=relay,
+        )
+        for start in going
+    ]
     by_start = dict(zip(routes, values[len(routes) :].tolist(), strict=True))
     if not told:
         promising = zip(rough.promising, optima, strict=False)

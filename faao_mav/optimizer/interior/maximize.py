@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -85,20 +84,13 @@ def maximize(
         strategy=strategy or (SLOW_START if kin.min_speed > 0 else COLD_START),
     )
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
-        end = search.run(max_iterations)
-    flight = feasible(kin, start, end.v.T * kin.max_speed, kept)
+        v = search.run(max_iterations).T * kin.max_speed
+    flight = feasible(kin, start, v, kept)
     value = float(objectives(stage(flight.w.T).value[:, None], kin, relay)[0])
-    converged = end.converged and value > first - tolerance * abs(first)
+    converged = search.converged and value > first - tolerance * abs(first)
     if not value >= first:
         flight, value = start, first
-    return LocalOptimum(flight, value, end.iterations, end.residual, converged)
-
-
-def maximize_all(
-    kin: Kinematics, stage: Stage, starts: Sequence[Trajectory], **options: Any
-) -> list[LocalOptimum]:
-    """Return what `maximize` finds from each of the `starts`."""
-    return [maximize(kin, stage, start, **options) for start in starts]
+    return LocalOptimum(flight, value, search.iterations, search.residual, converged)
 
 
 def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:

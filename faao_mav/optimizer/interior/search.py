@@ -7,7 +7,7 @@ iterates that hug the limits are given multipliers from a larger mu.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -71,18 +71,11 @@ WARM_START = StartStrategy(mu=1e-2, room=0.03)
 """For starts that are nearly optimal."""
 
 
-@dataclass(frozen=True, slots=True)
-class SearchResult:
-    """Where a search ended: scaled speeds v (2, n), and the rest as in `LocalOptimum`."""
-
-    v: Real
-    iterations: int
-    residual: float
-    converged: bool
-
-
 class Search:
-    """A search from the unknowns w, v, a (6, n) of a start, in solver units."""
+    """A search from the unknowns w, v, a (6, n) of a start, in solver units.
+
+    `residual` is where it is, as in `LocalOptimum`, after so many `iterations`.
+    """
 
     def __init__(
         self,
@@ -103,26 +96,24 @@ class Search:
         s = np.maximum(at.values, strategy.room * system.headroom)
         y = np.zeros((len(system.chain.after), kin.slots - 1))
         self.iterate = Iterate(at, y, s, self.mu / s, s - at.values)
-        self.proximal, self.steepness = 0.0, 1.0
+        self.proximal, self.steepness, self.residual = 0.0, 1.0, np.inf
         self.iterations = self.attempts = self.short = self.centrings = 0
         self.best, self.best_v = -np.inf, x[list(V)]
 
-    def run(self, max_iterations: int) -> SearchResult:
-        """Iterate until the search has ended."""
+    def run(self, max_iterations: int) -> Real:
+        """Iterate until the search has ended; return the scaled speeds v (2, n) where it did."""
         while True:
-            slope, residual = self._measure()
-            converged = residual < self.tolerance
+            slope, self.residual = self._measure()
+            ended = self.converged or not np.isfinite(self.residual)  # the limits have no interior
             lost = self.iterations >= max_iterations or self.centrings > _MAX_CENTRINGS
-            # not finite: the limits have no interior left
-            if converged or not np.isfinite(residual) or (lost and not self.attempts):
-                v = self.best_v if self.best > -np.inf else self.iterate.at.x[list(V)]
-                return SearchResult(
-                    v,
-                    self.iterations,
-                    residual if np.isfinite(residual) else np.inf,
-                    bool(converged),
-                )
+            if ended or (lost and not self.attempts):
+                return self.best_v if self.best > -np.inf else self.iterate.at.x[list(V)]
             self._advance(slope)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the residual is below the tolerance."""
+        return bool(self.residual < self.tolerance)
 
     def _measure(self) -> tuple[float, float]:
         """Return the scaled gradient of the Lagrangian and the residual; note the best iterate."""
