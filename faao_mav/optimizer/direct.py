@@ -215,16 +215,20 @@ def _sharpened(
     """Return the best by the steps themselves of `optima` and of those for ever sharper steps."""
     found, now = [*optima], [*optima]
     for width in _WIDTHS:
-        now = maximize_all(
-            problem.kinematics,
-            rate_field(problem, scheme, width),
-            [each.trajectory for each in now],
-            constraints=problem.constraints(problem.kinematics),
-            tolerance=problem.plan.optimizer.tolerance,
-            max_iterations=max_iterations,
-            strategy=WARM_START,
-            relay=problem.maximised_queue,
-        )
+        field = rate_field(problem, scheme, width)
+        now = [
+            maximize(
+                problem.kinematics,
+                field,
+                each.trajectory,
+                constraints=problem.constraints(problem.kinematics),
+                tolerance=problem.plan.optimizer.tolerance,
+                max_iterations=max_iterations,
+                strategy=WARM_START,
+                relay=problem.maximised_queue,
+            )
+            for each in now
+        ]
         found += now
     flights = [each.trajectory.w for each in found]
     worth = [_worth(problem, w, _designed(problem, scheme, w)) for w in flights]
