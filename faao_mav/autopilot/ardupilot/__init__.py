@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule
 from faao_mav.autopilot.parameter import ParameterValues, rule
-from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse
+from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse, VehicleType
 from faao_mav.geodesy import LocalFrame
 
 _DEGREE = 111_318.84502145034
@@ -86,14 +87,11 @@ ARDUPILOT = AutopilotFamily(
 )
 """Manners: `MissionItemProtocol.cpp` (behaviour only), and what it did in its simulator."""
 
-HOME_OUTSIDE_FENCE = "with FENCE_ENABLE 1 ArduPilot does not arm there"
-"""Measured on ArduCopter and ArduPlane 4.7."""
-
 _UNION = 2
 """The bit of FENCE_OPTIONS by which being inside one of several inclusions is enough."""
 
 
-def needs_one_inclusion(vehicle: ParameterValues) -> bool:
+def _needs_one_inclusion(vehicle: ParameterValues) -> bool:
     """Tell whether being inside one of several inclusion areas is enough for `vehicle`."""
     return bool(int(vehicle.value("fence_options")) & _UNION)
 
@@ -136,7 +134,19 @@ SHARED = (
 FENCE_TYPE, whose bits are 1 ceiling, 2 circle, 4 areas, 8 floor. Source: ArduPilot 4.7."""
 
 
-def rally_rule(vehicle: ParameterValues) -> RallyRule:
+def _rally_rule(vehicle: ParameterValues) -> RallyRule:
     """Return where a return goes (ArduPilot 4.7, AP_Rally)."""
     limit = vehicle.value("rally_limit")
     return RallyRule(limit if limit > 0 else math.inf, vehicle.value("rally_home") != 0)
+
+
+ardupilot_type = partial(
+    VehicleType,
+    family=ARDUPILOT,
+    spool=3.5,  # measured: 100 m of take-off take 46 s
+    fence_needs_one_inclusion=_needs_one_inclusion,
+    home_outside_fence="with FENCE_ENABLE 1 ArduPilot does not arm there",  # measured on 4.7
+    models_wind=True,
+    rally=_rally_rule,
+)
+"""Makes the `VehicleType` of what ArduPilot flies."""

@@ -2,13 +2,7 @@
 
 import math
 
-from faao_mav.autopilot.ardupilot import (
-    ARDUPILOT,
-    HOME_OUTSIDE_FENCE,
-    at_fence,
-    needs_one_inclusion,
-    rally_rule,
-)
+from faao_mav.autopilot.ardupilot import ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.copter.flight_model import ArduCopter as ArduCopter
 from faao_mav.autopilot.ardupilot.copter.parameters import TABLE
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
@@ -17,7 +11,6 @@ from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import ParameterValues, Recommended
-from faao_mav.autopilot.vehicle_type import VehicleType
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
 
@@ -64,8 +57,7 @@ def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
     )
 
 
-ARDUCOPTER = VehicleType(
-    family=ARDUPILOT,
+ARDUCOPTER = ardupilot_type(
     kind="copter",
     name="ArduCopter",
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
@@ -73,19 +65,14 @@ ARDUCOPTER = VehicleType(
     hovers=True,
     parameters=TABLE,
     dialect=COPTER_DIALECT,
-    spool=3.5,  # measured: 100 m of take-off take 46 s
     whole_second_holds=True,
     fastest=_FASTEST,
-    fence_needs_one_inclusion=needs_one_inclusion,
-    home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
     failsafes=COPTER_FAILSAFES,
     flight_model=ArduCopter.from_vehicle,
     recommendation=Recommended(4.0, (0.5, 5.0), {"jerk": _JERK}, {"jerk": _LIVELIEST_JERK}),
     ceilings={"max_acceleration": ("lean_angle", "acceleration")},
     body=ARDUCOPTER_BODY,
-    models_wind=True,
     orbits=_orbit,
-    rally=rally_rule,
 )
 """ArduCopter 4.1 and later; measured on 4.7."""

@@ -1,13 +1,6 @@
 """ArduPlane: what it is, and how it flies a mission."""
 
-from faao_mav.autopilot.ardupilot import (
-    ARDUPILOT,
-    HOME_OUTSIDE_FENCE,
-    SHARED,
-    at_fence,
-    needs_one_inclusion,
-    rally_rule,
-)
+from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPlane
@@ -15,7 +8,6 @@ from faao_mav.autopilot.body import ARDUPLANE_BODY
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
 from faao_mav.autopilot.parameter import Parameter, row, rule, table
-from faao_mav.autopilot.vehicle_type import VehicleType
 
 _LOITER, _RTL = 12, 11
 _MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
@@ -36,8 +28,7 @@ _TABLE = table(
 """ArduPlane's parameters. A negative `loiter_radius` turns left; a `return_height` below 0 keeps
 the height at which the return begins."""
 
-ARDUPLANE = VehicleType(
-    family=ARDUPILOT,
+ARDUPLANE = ardupilot_type(
     kind="plane",
     name="ArduPlane",
     mav_types=(1,),
@@ -45,18 +36,13 @@ ARDUPLANE = VehicleType(
     hovers=False,
     parameters=_TABLE,
     dialect=PLANE_DIALECT,
-    spool=3.5,
     returns_at_least=False,
-    fence_needs_one_inclusion=needs_one_inclusion,
-    home_outside_fence=HOME_OUTSIDE_FENCE,
     at_fence=at_fence({0: "report"}),
     failsafes=PLANE_FAILSAFES,
     flight_model=ArduPlane.from_vehicle,
     ceilings={"max_acceleration": ("roll_limit",)},
     body=ARDUPLANE_BODY,
-    models_wind=True,
     orbits=plane_orbit,
-    rally=rally_rule,
 )
 """ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
 recommended."""
