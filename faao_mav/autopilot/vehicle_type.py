@@ -101,7 +101,8 @@ class VehicleType:
     spool: float = 2.0  # How long a take-off takes before it climbs, s
     returns_at_least: bool = True  # A return never descends for the height of returns
     whole_second_holds: bool = False  # The hold of a waypoint loses its fraction of a second
-    fastest: float = 20.0  # The greatest speed that it can be told, m/s
+    # The greatest speed that it can be told, m/s: WPNAV_SPEED's and MPC_XY_CRUISE's documented one
+    fastest: float = 20.0
     # Being inside one of several inclusion areas is enough; else the vehicle has to be inside all
     fence_needs_one_inclusion: Callable[[ParameterValues], bool] = lambda _: True
     home_outside_fence: str = ""  # What it does with a mission where home lies outside the fence

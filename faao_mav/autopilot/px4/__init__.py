@@ -9,6 +9,7 @@ read at several revisions about 1.16; controller gains are PX4's documented defa
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -27,9 +28,6 @@ from faao_mav.autopilot.vehicle_type import (
     VehicleType,
 )
 from faao_mav.geodesy import LocalFrame
-
-_HOME_OUTSIDE_FENCE = "PX4 says so (Geofence invalid), and flies the mission all the same"
-"""Measured on PX4 1.16.1."""
 
 _RADIUS = 6_371_000.0
 """The radius of PX4's Earth, m."""
@@ -137,9 +135,6 @@ def _fence_ahead(vehicle: ParameterValues, speed: Real) -> Real:
     return np.asarray(to_fastest + braking + _FENCE_CHECKS * speed)
 
 
-_FASTEST = 20.0
-"""The greatest speed that it can be told, m/s (the documented maximum of MPC_XY_CRUISE)."""
-
 _ERROR_LIMIT, _HEIGHT_RADIUS = 10.0, 3.0
 """The recommended MPC_XY_ERR_MAX and NAV_MC_ALT_RAD, m. Measured: with the default of 2 m progress
 slows whenever the aircraft lags; with that of 0.8 m it missed waypoints for their altitude."""
@@ -155,20 +150,25 @@ def _rally(vehicle: ParameterValues) -> RallyRule:
     return RallyRule(math.inf if kind in (0, 1, 3) else -1.0, home=kind != 1)
 
 
-PX4_COPTER = VehicleType(
+_px4_type = partial(
+    VehicleType,
     family=PX4,
-    kind="copter",
     name="PX4",
+    dialect=DIALECT,
+    # measured on 1.16.1
+    home_outside_fence="PX4 says so (Geofence invalid), and flies the mission all the same",
+    at_fence=_at_fence,
+    failsafes=FAILSAFES,
+    rally=_rally,
+)
+
+PX4_COPTER = _px4_type(
+    kind="copter",
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
     modes=_MODES,
     hovers=True,
     parameters=COPTER_TABLE,
-    dialect=DIALECT,
-    home_outside_fence=_HOME_OUTSIDE_FENCE,
-    at_fence=_at_fence,
-    failsafes=FAILSAFES,
     fence_ahead=_fence_ahead,
-    fastest=_FASTEST,
     flight_model=Px4.from_vehicle,
     recommendation=Recommended(
         5.0,
@@ -177,24 +177,16 @@ PX4_COPTER = VehicleType(
     ),
     ceilings={"max_speed": ("max_speed",), "max_acceleration": ("lean_angle", "acceleration")},
     body=PX4_BODY,
-    rally=_rally,
 )
 """A multicopter with PX4 1.16."""
 
-PX4_PLANE = VehicleType(
-    family=PX4,
+PX4_PLANE = _px4_type(
     kind="plane",
-    name="PX4",
     mav_types=(1,),
     modes=replace(_MODES, guided=None),
     hovers=False,
     parameters=PLANE_TABLE,
-    dialect=DIALECT,
-    home_outside_fence=_HOME_OUTSIDE_FENCE,
-    at_fence=_at_fence,
-    failsafes=FAILSAFES,
     unmodelled="there is no model of how PX4 flies planes",
     orbits=plane_orbit,
-    rally=_rally,
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""

@@ -14,9 +14,6 @@ from faao_mav.autopilot.parameter import ParameterValues, Recommended
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
 
-_FASTEST = 20.0
-"""The greatest speed that it can be told, m/s (WPNAV_SPEED's documented maximum)."""
-
 _JERK, _LIVELIEST_JERK = 10.0, 20.0
 """The recommended jerk, m/s³, and the one for bends at speed, with the greatest acceleration: its
 documented maximum. Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5,
@@ -66,7 +63,6 @@ ARDUCOPTER = ardupilot_type(
     parameters=TABLE,
     dialect=COPTER_DIALECT,
     whole_second_holds=True,
-    fastest=_FASTEST,
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
     failsafes=COPTER_FAILSAFES,
     flight_model=ArduCopter.from_vehicle,
