@@ -15,7 +15,7 @@ from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
-from faao_mav.schedule.scheduler import ALLOWED_ERROR, GOOD_COST, WORTHWHILE, Scheduler
+from faao_mav.schedule.scheduler import ALLOWED_ERROR, WORTHWHILE, Scheduler
 from faao_mav.vector import lengths
 
 # The shortest wait at the first waypoint, s. After a hold of 1 s ArduCopter is still drifting and
@@ -23,11 +23,11 @@ from faao_mav.vector import lengths
 _FIRST_WAIT = 6.0
 
 _LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
-# The most waypoints that splitting legs leads to, for a schedule that is good and for another; the
-# path itself may take more. 40 for all: 2 more items and 14 % more time, means of 36 plans for PX4.
-_MOST_WAYPOINTS, _MOST_TO_MEND = 24, 40
 
-_FIRST_FLIGHTS = 3  # the most flights of a first fit: they tell which parameters to go on with
+# The most waypoints to which splitting legs leads; the path itself may take more. Chosen: with 24
+# for good schedules, a mean of 2 items less, and up to twice the error.
+_MOST_WAYPOINTS = 40
+
 _ROUNDS = 5  # the most rounds of splitting legs
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
 _LEAST = 1e-9  # the least duration, s, and length, m, of a leg: there is no speed without them
@@ -46,7 +46,7 @@ class CopterScheduler(Scheduler):
         waits[0] = max(waits[0], _FIRST_WAIT)
         if route.last == len(waits) - 1:  # it ends at rest
             waits[-1] = max(waits[-1], _LAST_WAIT)
-        return self.fitted(replace(route, waits=waits), self.max_speed, flights=_FIRST_FLIGHTS)
+        return self.fitted(replace(route, waits=waits), self.max_speed)
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
@@ -88,8 +88,9 @@ class CopterScheduler(Scheduler):
                 at = usable[np.argmax(off[usable])]
                 splits.append((float(off[inside].max()), float(self.t[at])))
         splits.sort(reverse=True)
-        most = _MOST_WAYPOINTS if schedule.cost <= GOOD_COST else _MOST_TO_MEND
-        return np.sort([time for _, time in splits[: max(0, most - len(route.positions))]])
+        return np.sort(
+            [time for _, time in splits[: max(0, _MOST_WAYPOINTS - len(route.positions))]]
+        )
 
     def _long_enough(self, route: Route, k: int, inside: Integers) -> Flags:
         """Tell for each sample `inside` leg k whether both parts are long enough for their speed.

@@ -80,13 +80,12 @@ class Scheduler(ABC):
         top_speed: float,
         *,
         groups: Integers | None = None,
-        flights: int = _MOST_FLIGHTS,
         begun: Schedule | None = None,
     ) -> Schedule:
         """Return the flight of `route` with the speeds, the waits and the lead that fit best.
 
-        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one. So many
-        `flights` are predicted at most; `begun` is that of `route`, where it is known.
+        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one. `begun`
+        is the flight of `route`, where it is known.
         """
         if len(route.speeds) == 0:
             return self.flight(route)
@@ -95,7 +94,7 @@ class Scheduler(ABC):
         x = unknowns.initial
         best = begun or self.flight(unknowns.commanded(x))
         cost = goal.cost(best)
-        for _ in range(flights - 1):
+        for _ in range(_MOST_FLIGHTS - 1):
             tried, foreseen = stepped(goal, unknowns, self._retimed(best), x)
             if foreseen > (1 - _LEAST_GAIN) * cost:
                 break

@@ -94,7 +94,7 @@ def test_a_flight_without_an_end_is_not_the_one_that_fits(monkeypatch: pytest.Mo
 
 def test_a_fit_takes_few_flights(monkeypatch: pytest.MonkeyPatch) -> None:
     plan, fly = planned(route_with(SPEEDS, WAITS)), ArduCopter.fly
-    before, flights = plan.flight(GUESS).deviation.rms, []
+    flights = []
 
     def counted(model: ArduCopter, path: FlightPath) -> Flown:
         flights.append(path)
@@ -103,9 +103,6 @@ def test_a_fit_takes_few_flights(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ArduCopter, "fly", counted)
     assert fitted(plan, GUESS).deviation.rms < 0.5
     assert len(flights) <= 6
-    flights.clear()
-    assert fitted(plan, GUESS, flights=2).deviation.rms < 0.3 * before
-    assert len(flights) == 2
 
 
 def test_setting_out_before_the_plan_is_found() -> None:
