@@ -53,7 +53,7 @@ class CopterScheduler(Scheduler):
         best, top_speed = first, self.max_speed
         if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
             top_speed *= OVERSPEED
-            best = self.fitted(best.route, top_speed, begun=best)
+            best = self.fitted(best.route, top_speed)
         for _ in range(_ROUNDS):
             times = self._split_times(best)
             if not len(times):

@@ -74,25 +74,17 @@ class Scheduler(ABC):
         path = route.path(whole_seconds=whole_seconds, altitude=self.altitude, wind=self.wind)
         return Schedule(route, self.model.fly(path), self.t, self.w, self.tolerance)
 
-    def fitted(
-        self,
-        route: Route,
-        top_speed: float,
-        *,
-        groups: Integers | None = None,
-        begun: Schedule | None = None,
-    ) -> Schedule:
+    def fitted(self, route: Route, top_speed: float, *, groups: Integers | None = None) -> Schedule:
         """Return the flight of `route` with the speeds, the waits and the lead that fit best.
 
-        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one. `begun`
-        is the flight of `route`, where it is known.
+        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one.
         """
         if len(route.speeds) == 0:
             return self.flight(route)
         groups = np.arange(len(route.speeds)) if groups is None else groups
         unknowns, goal = Unknowns(route, groups, self.min_speed, top_speed), Goal(self.t, self.w)
         x = unknowns.initial
-        best = begun or self.flight(unknowns.commanded(x))
+        best = self.flight(unknowns.commanded(x))
         cost = goal.cost(best)
         for _ in range(_MOST_FLIGHTS - 1):
             tried, foreseen = stepped(goal, unknowns, self._retimed(best), x)
