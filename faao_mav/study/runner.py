@@ -70,9 +70,9 @@ def run_study(
     """
     with nullcontext() if cluster is None else _connected(cluster):
         old = _prepare(directory, cases) if directory is not None else ()
+        tell = observe or (lambda _: None)
         for row in old:
-            if observe is not None:
-                observe(row)
+            tell(row)
         done = {row.key: row for row in old}
         running = _rows([case for case in cases if case.key not in done], jobs, cluster)
         try:
@@ -80,8 +80,7 @@ def run_study(
                 if directory is not None:
                     append_row(row, directory)
                 done[row.key] = row
-                if observe is not None:
-                    observe(row)
+                tell(row)
         finally:
             with warnings.catch_warnings(action="ignore"):  # joblib says that it leaves work undone
                 running.close()
