@@ -17,7 +17,6 @@ from faao_mav.cli.shared import (
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
-    from faao_mav.mission.item import Home
     from faao_mav.sim import MockAutopilot
     from faao_mav.wire.messages import WireItem
     from faao_mav.wire.protocol import MissionType
@@ -76,6 +75,7 @@ def autopilot(
     """
     from faao_mav.autopilot import Vehicle
     from faao_mav.mission.formats.parameter_file import read_parameters
+    from faao_mav.mission.item import Home
     from faao_mav.sim import MockAutopilot, behaviour_of
     from faao_mav.sim.faults import Faults
     from faao_mav.sim.serve import serve
@@ -83,6 +83,10 @@ def autopilot(
     from faao_mav.wire.signing import read_signing
     from faao_mav.wire.transport import open_transport
 
+    wanted = f"--home {home}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
+    latitude, longitude, altitude = read_numbers(home, 3, wanted)
+    if abs(altitude) > _HIGHEST:
+        raise InputError(f"--home {home}: expected an altitude of at most {_HIGHEST:g} m")
     values = {} if parameters is None else read_parameters(parameters)
     check_known(None, aircraft)
     behaviour = behaviour_of(kind)
@@ -92,7 +96,7 @@ def autopilot(
         behaviour,
         aircraft=aircraft,
         address=Address(system, 1),
-        home=read_home(home),
+        home=Home(latitude, longitude, altitude),
         wind=read_wind(wind) or (0.0, 0.0),
         parameters=values,
         speedup=speedup,
@@ -148,14 +152,3 @@ class Diary:
             if items != self._told[part]:
                 typer.echo(f"{part.title}: {len(items)} rows")
         self._told = self._seen
-
-
-def read_home(text: str) -> "Home":
-    """Return the home that `LAT,LON,ALT` names; raises `InputError`."""
-    from faao_mav.mission.item import Home
-
-    wanted = f"--home {text}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
-    latitude, longitude, altitude = read_numbers(text, 3, wanted)
-    if abs(altitude) > _HIGHEST:
-        raise InputError(f"--home {text}: expected an altitude of at most {_HIGHEST:g} m")
-    return Home(latitude, longitude, altitude)

@@ -43,7 +43,7 @@ _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
 _SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
 
 _BESIDE = 9.0  # points from a waypoint to the middle of its number; chosen: clear of a route's line
-_APART = 0.05  # least distance of two items with numbers, of how far all reach; chosen to be read
+_APART = 0.07  # least distance of two items with numbers, of how far all reach; chosen to be read
 
 
 def route_map(
