@@ -1,6 +1,6 @@
 """The planner page: drag stations, draw zones, see the flight; served on loopback by NiceGUI.
 
 `document` and `scene` hold the plan that is edited, `planner` asks worker processes for `answers`,
-`vehicle` uploads, watches and debriefs there, `page` shows it all. Only `page`, its parts `form`,
-`results`, `fly` and `map`, and `serve` know NiceGUI.
+`vehicle` uploads, watches and debriefs beside it, `page` shows it all. Only `page`, its parts
+`panels`, `fly` and `map`, and `serve` know NiceGUI.
 """

@@ -14,11 +14,10 @@ from faao_mav.app.answers import FILES, Answer, made
 from faao_mav.app.charts import heights
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.fly import Fly
-from faao_mav.app.form import Form, fields
 from faao_mav.app.guard import TILES
 from faao_mav.app.map import PlannerMap
+from faao_mav.app.panels import Form, Results, fields
 from faao_mav.app.planner import Planner
-from faao_mav.app.results import Results
 from faao_mav.app.scene import STATIONS, Scene
 from faao_mav.app.tiles import OPEN_STREET_MAP, Background
 from faao_mav.app.workers import Workers
