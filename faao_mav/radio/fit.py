@@ -16,6 +16,8 @@ from scipy.optimize import minimize_scalar
 
 from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InputError
+from faao_mav.radio.gain import PathGain
+from faao_mav.vector import lengths
 
 TERMS = 3
 """Terms of the elevation that a law has at most: of flights at five heights more gain nothing."""
@@ -130,10 +132,8 @@ class LinkFit:
 
     def gain_db(self, place: Real) -> Real:
         """Return the fitted level, dB, at `place` (..., 3), m from the station's antenna."""
-        d = np.linalg.norm(place, axis=-1)
-        s = place[..., 2] / d
-        terms = sum((c * s**k for k, c in enumerate(self.elevation, 1)), np.zeros_like(d))
-        return np.asarray(self.level - 10.0 * self.exponent * np.log10(d) + terms)
+        law = PathGain(10.0 ** (self.level / 10.0), self.exponent, self.elevation)
+        return law.db(lengths(place[..., :2]), place[..., 2])
 
 
 def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:

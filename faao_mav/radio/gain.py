@@ -43,12 +43,12 @@ class PathGain:
         beyond = self._beyond_square_law(squared_distance, height)
         return np.asarray(self.reference_gain / squared_distance * np.exp(beyond))
 
-    def log(self, squared_distance: Real, height: float) -> Real:
+    def log(self, squared_distance: Real, height: float | Real) -> Real:
         """Return l, the natural logarithm of `gain`, (...)."""
         beyond = self._beyond_square_law(squared_distance, height)
         return np.asarray(np.log(self.reference_gain / squared_distance) + beyond)
 
-    def db(self, distance: Real, height: float) -> Real:
+    def db(self, distance: Real, height: float | Real) -> Real:
         """Return the gain in dB at horizontal distances (...), m."""
         return self.log(np.asarray(distance) ** 2 + height**2, height) / PER_DB
 
@@ -106,7 +106,7 @@ class PathGain:
             total = (total + (-k / 2) ** order * self._terms[k - 1]) * s
         return total
 
-    def _beyond_square_law(self, squared_distance: Real, height: float) -> Real:
+    def _beyond_square_law(self, squared_distance: Real, height: float | Real) -> Real:
         """Return ln of the gain over rho_0 d^-2, (...)."""
         s = height / np.sqrt(squared_distance)
         return (1 - self.exponent / 2) * np.log(squared_distance) + self._elevation(s, 0)
