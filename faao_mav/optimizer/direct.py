@@ -27,6 +27,7 @@ from faao_mav.optimizer.interior.maximize import (
     maximize,
     objectives,
 )
+from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.interior.search import WARM_START
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
@@ -136,7 +137,7 @@ def direct(
         start = replace(best, trajectory=flights[int(values.argmax())])
         best = _sharpened(problem, scheme, [*optima, start], steps)
     if known_spread(problem):
-        best = _under_shadowing(problem, field, best, steps)
+        best = _under_shadowing(problem, field, best)
     flight, precoders, error = _at_exact_rates(problem, scheme, field, best)
     residual = f"stationary to {best.residual:.1e}"
     solution = make_solution(
@@ -209,6 +210,22 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
     return equal[int(np.argmax(np.round(delivered / EQUAL)))]
 
 
+def _maximized(
+    problem: Problem, stage: Stage, start: Trajectory, max_iterations: int
+) -> LocalOptimum:
+    """Return what is found from `start`, near an optimum, under the limits of `problem`."""
+    return maximize(
+        problem.kinematics,
+        stage,
+        start,
+        constraints=problem.constraints(problem.kinematics),
+        tolerance=problem.plan.optimizer.tolerance,
+        max_iterations=max_iterations,
+        strategy=WARM_START,
+        relay=problem.maximised_queue,
+    )
+
+
 def _sharpened(
     problem: Problem, scheme: Design, optima: Sequence[LocalOptimum], max_iterations: int
 ) -> LocalOptimum:
@@ -216,45 +233,19 @@ def _sharpened(
     found, now = [*optima], [*optima]
     for width in _WIDTHS:
         field = rate_field(problem, scheme, width)
-        now = [
-            maximize(
-                problem.kinematics,
-                field,
-                each.trajectory,
-                constraints=problem.constraints(problem.kinematics),
-                tolerance=problem.plan.optimizer.tolerance,
-                max_iterations=max_iterations,
-                strategy=WARM_START,
-                relay=problem.maximised_queue,
-            )
-            for each in now
-        ]
+        now = [_maximized(problem, field, each.trajectory, max_iterations) for each in now]
         found += now
     flights = [each.trajectory.w for each in found]
     worth = [_worth(problem, w, _designed(problem, scheme, w)) for w in flights]
     return found[int(np.argmax(worth))]
 
 
-def _under_shadowing(
-    problem: Problem, field: RateField, optimum: LocalOptimum, max_iterations: int
-) -> LocalOptimum:
+def _under_shadowing(problem: Problem, field: RateField, optimum: LocalOptimum) -> LocalOptimum:
     """Return the best under shadowing of `optimum` and of those that stay less about one place."""
     begin = optimum.trajectory
     rates = partial(field.value, begin.w.T)
-    others = [
-        maximize(
-            problem.kinematics,
-            tolled(problem, field, begin.w, rates, z),
-            begin,
-            constraints=problem.constraints(problem.kinematics),
-            tolerance=ROUGH,
-            max_iterations=min(max_iterations, _TOLLED_ITERATIONS),
-            strategy=WARM_START,
-            relay=problem.maximised_queue,
-        )
-        for z in TOLLS
-    ]
-    found = [optimum, *others]
+    stages = [tolled(problem, field, begin.w, rates, z) for z in TOLLS]
+    found = [optimum, *(_maximized(problem, each, begin, _TOLLED_ITERATIONS) for each in stages)]
     flights = [each.trajectory.w for each in found]
     return found[int(np.argmax([worth(problem, w, partial(field.value, w.T)) for w in flights]))]
 
@@ -268,7 +259,7 @@ def _at_exact_rates(
     further with fixed precoders: the rates are then exact, and whatever they gain the best
     ones gain too.
     """
-    flight, kin = optimum.trajectory, problem.kinematics
+    flight = optimum.trajectory
     precoders = [
         _precoders(link, rate, scheme, flight.w)
         for link, rate in zip(field.links, field.rates, strict=True)
@@ -285,15 +276,8 @@ def _at_exact_rates(
         FixedRate(link, unturned(link, link_coordinates(link, flight.w.T).cosine, P))
         for link, P in zip(field.links, precoders, strict=True)
     ]
-    flight = maximize(
-        kin,
-        RateField(field.links, tuple(fixed)),
-        flight,
-        constraints=problem.constraints(kin),
-        tolerance=problem.plan.optimizer.tolerance,
-        max_iterations=_EXACT_ITERATIONS,
-        strategy=WARM_START,
-        relay=problem.maximised_queue,
+    flight = _maximized(
+        problem, RateField(field.links, tuple(fixed)), flight, _EXACT_ITERATIONS
     ).trajectory
     return flight, _designed(problem, scheme, flight.w, precoders), error
 
