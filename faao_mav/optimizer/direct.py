@@ -39,8 +39,7 @@ from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
 from faao_mav.optimizer.search.ways import starts_inside
-from faao_mav.optimizer.shadowing import TOLLS, tolled, worth
-from faao_mav.optimizer.shadowing import known as known_spread
+from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 
 _LONG_SEARCH = 6
@@ -136,7 +135,7 @@ def direct(
     if problem.plan.radio.rates is not None:
         start = replace(best, trajectory=flights[int(values.argmax())])
         best = _sharpened(problem, scheme, [*optima, start], steps)
-    if known_spread(problem):
+    if spread_known(problem):
         best = _under_shadowing(problem, field, best)
     flight, precoders, error = _at_exact_rates(problem, scheme, field, best)
     residual = f"stationary to {best.residual:.1e}"
@@ -151,7 +150,7 @@ def direct(
     )
     reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
     history = np.maximum.accumulate([values[0], *values[len(routes) :]]) - error
-    if known_spread(problem):  # without it another flight may have more
+    if spread_known(problem):  # without it another flight may have more
         history = np.minimum(history, reached)
     return replace(
         solution,
@@ -267,7 +266,7 @@ def _at_exact_rates(
     reached = _worth(problem, flight.w, precoders)
     told = scheme.gaussian or problem.plan.radio.rates is not None
     error = 0.0 if told else optimum.value - reached
-    if known_spread(problem):  # whose value is that under shadowing
+    if spread_known(problem):  # whose value is that under shadowing
         return flight, precoders, 0.0
     cutoff = problem.plan.optimizer.rate == "cutoff"
     if not cutoff or all(not isinstance(rate, TableRate) or rate.exact for rate in field.rates):

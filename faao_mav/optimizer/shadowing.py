@@ -55,7 +55,7 @@ TOLLS = (0.25, 0.5, 0.9, 1.4)
 or none."""
 
 
-def known(problem: Problem) -> bool:
+def spread_known(problem: Problem) -> bool:
     """Return whether the plan says of a hop how far it is off its law."""
     return any(law.spread_db is not None for law in problem.plan.radio.gain_laws)
 
@@ -109,7 +109,7 @@ class Shadowed:
 
 def shadowed(solution: Solution) -> Shadowed | None:
     """Return what arrives of a solution with its precoders; None where no spread is known."""
-    if not known(solution.problem):
+    if not spread_known(solution.problem):
         return None
     found = outcomes(
         solution.problem,
