@@ -20,6 +20,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import Design, design
+from faao_mav.optimizer.interior.constraint import StartStrategy
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
@@ -33,8 +34,6 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.slot_rate import FixedRate, unturned
-from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
@@ -45,10 +44,6 @@ from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solut
 _LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded. Chosen: half-duplex plans with a
 buffer need up to 300 steps."""
-
-_EXACT_ITERATIONS = 12
-"""Iterations at exact rates, after those in a table, at most. Chosen. Measured with QPSK on 2, 3
-and 3 antennas and known draws, three seeds: without them the rates are 1 % lower."""
 
 _WIDTHS = (1.5, 0.5)
 """Decibels over which steps of a radio's own rates rise in the last searches. Chosen: of a step
@@ -114,19 +109,7 @@ def direct(
     if told:  # what is reported are the rates of the alphabet, or the steps themselves
         values = np.array([_worth(problem, f.w, _designed(problem, scheme, f.w)) for f in flights])
     tell(2, "the best start", float(values.max()))
-    optima = [
-        maximize(
-            kin,
-            field,
-            start,
-            constraints=problem.constraints(kin),
-            tolerance=options.tolerance,
-            max_iterations=steps,
-            strategy=strategy,
-            relay=relay,
-        )
-        for start in going
-    ]
+    optima = [_maximized(problem, field, start, steps, strategy) for start in going]
     by_start = dict(zip(routes, values[len(routes) :].tolist(), strict=True))
     if not told:
         promising = zip(rough.promising, optima, strict=False)
@@ -137,13 +120,20 @@ def direct(
         best = _sharpened(problem, scheme, [*optima, start], steps)
     if spread_known(problem):
         best = _under_shadowing(problem, field, best)
-    flight, precoders, error = _at_exact_rates(problem, scheme, field, best)
+    flight = best.trajectory
+    precoders = [
+        _precoders(link, rate, scheme, flight.w)
+        for link, rate in zip(field.links, field.rates, strict=True)
+    ]
+    error = 0.0  # by how much values in the field are above those of the precoders themselves
+    if not told and not spread_known(problem):
+        error = best.value - _worth(problem, flight.w, precoders)
     residual = f"stationary to {best.residual:.1e}"
     solution = make_solution(
         problem,
         flight,
-        _pair([link.small_scale(flight.w) for link in problem.links]),
-        _pair(precoders),
+        [link.small_scale(flight.w) for link in problem.links],
+        precoders,
         [],
         converged=best.converged,
         ending=residual if best.converged else f"stopped after {best.iterations} steps, {residual}",
@@ -210,9 +200,13 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
 
 
 def _maximized(
-    problem: Problem, stage: Stage, start: Trajectory, max_iterations: int
+    problem: Problem,
+    stage: Stage,
+    start: Trajectory,
+    max_iterations: int,
+    strategy: StartStrategy | None = WARM_START,
 ) -> LocalOptimum:
-    """Return what is found from `start`, near an optimum, under the limits of `problem`."""
+    """Return what is found from `start`, without another strategy near an optimum."""
     return maximize(
         problem.kinematics,
         stage,
@@ -220,7 +214,7 @@ def _maximized(
         constraints=problem.constraints(problem.kinematics),
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=max_iterations,
-        strategy=WARM_START,
+        strategy=strategy,
         relay=problem.maximised_queue,
     )
 
@@ -247,38 +241,6 @@ def _under_shadowing(problem: Problem, field: RateField, optimum: LocalOptimum) 
     found = [optimum, *(_maximized(problem, each, begin, _TOLLED_ITERATIONS) for each in stages)]
     flights = [each.trajectory.w for each in found]
     return found[int(np.argmax([worth(problem, w, partial(field.value, w.T)) for w in flights]))]
-
-
-def _at_exact_rates(
-    problem: Problem, scheme: Design, field: RateField, optimum: LocalOptimum
-) -> tuple[Trajectory, list[Complex], float]:
-    """Return the flight of `optimum`, its precoders, and by how much its value is too large.
-
-    Where searched precoders were interpolated in a table of modes, the flight is taken a little
-    further with fixed precoders: the rates are then exact, and whatever they gain the best
-    ones gain too.
-    """
-    flight = optimum.trajectory
-    precoders = [
-        _precoders(link, rate, scheme, flight.w)
-        for link, rate in zip(field.links, field.rates, strict=True)
-    ]
-    reached = _worth(problem, flight.w, precoders)
-    told = scheme.gaussian or problem.plan.radio.rates is not None
-    error = 0.0 if told else optimum.value - reached
-    if spread_known(problem):  # whose value is that under shadowing
-        return flight, precoders, 0.0
-    cutoff = problem.plan.optimizer.rate == "cutoff"
-    if not cutoff or all(not isinstance(rate, TableRate) or rate.exact for rate in field.rates):
-        return flight, precoders, error
-    fixed = [
-        FixedRate(link, unturned(link, link_coordinates(link, flight.w.T).cosine, P))
-        for link, P in zip(field.links, precoders, strict=True)
-    ]
-    flight = _maximized(
-        problem, RateField(field.links, tuple(fixed)), flight, _EXACT_ITERATIONS
-    ).trajectory
-    return flight, _designed(problem, scheme, flight.w, precoders), error
 
 
 def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
@@ -319,9 +281,3 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
     afresh = scheme.precoders(link, H)
     better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
     return np.asarray(np.where(better[:, None, None], carried, afresh))
-
-
-def _pair(arrays: list[Complex]) -> tuple[Complex, Complex]:
-    """Return the two `arrays` as a pair."""
-    first, second = arrays
-    return first, second

@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -256,8 +256,8 @@ def _excess(P: Complex, power: float) -> float:
 def make_solution(
     problem: Problem,
     flight: Trajectory,
-    fading: tuple[Complex, Complex],
-    precoders: tuple[Complex, Complex],
+    fading: Sequence[Complex],
+    precoders: Sequence[Complex],
     history: list[float],
     *,
     converged: bool,
