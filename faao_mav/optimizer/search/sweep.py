@@ -88,27 +88,15 @@ class Cells:
 def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
     """Return for each of `reaches` the largest of `values` (..., n) up to so many places away.
 
-    Windows that double serve all of them. scipy.ndimage has a filter for one reach, and takes
-    0.15 s to import.
-
     >>> largest_within(np.array([3.0, 0.0, 1.0, 0.0]), [1])[1].tolist()
     [3.0, 3.0, 1.0, 1.0]
     """
-    order = sorted(set(reaches))
-    length, most = values.shape[-1], order[-1]
-    edges = [(0, 0)] * (values.ndim - 1) + [(most, most)]
-    largest, size = np.pad(values, edges, constant_values=-np.inf), 1
-    found = {}
-    for reach in order:
-        width = 2 * reach + 1
-        while 2 * size <= width:
-            largest = np.maximum(largest[..., :-size], largest[..., size:])
-            size *= 2
-        first, last = most - reach, most + reach + 1 - size
-        found[reach] = np.maximum(
-            largest[..., first : first + length], largest[..., last : last + length]
-        )
-    return found
+    from scipy.ndimage import maximum_filter1d  # 0.15 s, and seldom needed
+
+    return {
+        reach: maximum_filter1d(values, 2 * reach + 1, mode="constant", cval=-np.inf)
+        for reach in set(reaches)
+    }
 
 
 def cells_of(
