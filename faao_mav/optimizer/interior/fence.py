@@ -18,7 +18,6 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.constraint import Constraint, Grid, Rows, W
-from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 
@@ -27,7 +26,7 @@ def fence_constraints(fence: FenceGeometry, kin: Kinematics) -> tuple[Constraint
     room = fence.room(kin) / LENGTH
     kept: list[Constraint] = []
     if len(fence.obstacles):
-        kept.append(KeepOut(fence, room, fence.obstacles.scaled(LENGTH)))
+        kept.append(KeepOut(fence, room))
     if len(fence.offsets):
         most = np.maximum(np.append(room, 0), np.insert(room, 0, 0))
         kept.append(KeepIn(fence, most))
@@ -57,17 +56,14 @@ class KeepOut(_Fence):
     0.005 it led a start among forty polygons farthest.
     """
 
-    obstacles: ConvexObstacles
     turns = True
     headroom = 0.02
 
     def rows(self, x: Real) -> Rows:
         """Return u . w - h(u) - room and u."""
-        u, h = (
-            part[..., 0, :] for part in self.obstacles.separation(x[:, None, :-1], x[:, None, 1:])
-        )
-        least = h + self.room
-        pieces = len(self.obstacles)
+        w, obstacles = LENGTH * x[:, None], self.geometry.obstacles
+        u, h = (part[..., 0, :] for part in obstacles.separation(w[..., :-1], w[..., 1:]))
+        least, pieces = h / LENGTH + self.room, len(obstacles)
         value, slope = np.ones((2 * pieces, x.shape[1])), np.zeros((2 * pieces, 2, x.shape[1]))
         for rows, at in (
             (slice(None, pieces), slice(None, -1)),

@@ -10,7 +10,7 @@ Source: Boyd and Vandenberghe, "Convex Optimization", 2004, 8.2; Gottschalk's se
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -30,12 +30,11 @@ class ConvexObstacles:
     """P convex polygons, each with all that is nearer than its `radius` (P,).
 
     `corners` (P, V, 2) go around counterclockwise; where there are fewer than V the last is
-    repeated. A disc is one corner with a radius. `unit` is the unit of length, m.
+    repeated. A disc is one corner with a radius. Lengths are in m.
     """
 
     corners: Real
     radius: Real
-    unit: float = 1.0
 
     @classmethod
     def of(cls, pieces: Sequence[Real], radii: Sequence[float]) -> "ConvexObstacles":
@@ -43,11 +42,6 @@ class ConvexObstacles:
         most = max(map(len, pieces), default=1)
         padded = [np.vstack([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in pieces]
         return cls(np.array(padded).reshape(-1, most, 2), np.array(radii, dtype=np.float64))
-
-    def scaled(self, unit: float) -> "ConvexObstacles":
-        """Return the same in another unit of length."""
-        share = self.unit / unit
-        return replace(self, corners=self.corners * share, radius=self.radius * share, unit=unit)
 
     def __len__(self) -> int:
         return len(self.corners)
@@ -80,7 +74,7 @@ class ConvexObstacles:
         u = _unit(away)
         h = u[0] * center[0] + u[1] * center[1] + size
         least = np.minimum(u[0] * a[0] + u[1] * a[1], u[0] * b[0] + u[1] * b[1]) - h
-        near = np.nonzero(least < _FAR / self.unit)
+        near = np.nonzero(least < _FAR)
         piece, a, b = near[0], a[:, near[1], near[2]], b[:, near[1], near[2]]
         best = self._best(piece, a, b)
         u[0][near], u[1][near] = best
