@@ -21,7 +21,7 @@ import numpy as np
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import ENERGY_SHARE
-from faao_mav.optimizer.interior.maximize import constraints_of, maximize
+from faao_mav.optimizer.interior.maximize import constraints_of, maximize_all
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
@@ -138,19 +138,15 @@ def from_random(problem: Problem, count: int) -> float:
             flight = sparing_starts(kin, {"": flight}, every).get("")
         if flight is not None:
             inside.append(flight)
-    field = rate_field(problem, design(problem.plan))
-    optima = [
-        maximize(
-            kin,
-            field,
-            start,
-            constraints=kept,
-            tolerance=1e-4,
-            max_iterations=300,
-            relay=problem.relay,
-        )
-        for start in inside
-    ]
+    optima = maximize_all(
+        kin,
+        rate_field(problem, design(problem.plan)),
+        inside,
+        constraints=kept,
+        tolerance=1e-4,
+        max_iterations=300,
+        relay=problem.relay,
+    )
     return max((optimum.value for optimum in optima), default=math.nan)
 
 

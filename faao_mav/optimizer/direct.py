@@ -1,7 +1,7 @@
 """The direct method: one loop over trajectory and precoders on the true rate.
 
 maximise min(R_U, R_G) of (9), (10) under (11)-(13f), or with `radio.causal` what the relay delivers
-of both rates: see `interior.rewards`. More rate in a slot never delivers less, so that the best
+of both rates: see `interior.queue`. More rate in a slot never delivers less, so that the best
 precoders are the same. For given positions the best precoders of
 every slot are a problem of their own, so that the rates become functions of the trajectory alone;
 by the envelope theorem their gradients are those at the best precoders. What is left is a flight
@@ -20,7 +20,6 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import Design, design
-from faao_mav.optimizer.interior.constraint import StartStrategy
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
@@ -29,7 +28,7 @@ from faao_mav.optimizer.interior.maximize import (
     objectives,
 )
 from faao_mav.optimizer.interior.rewards import Stage
-from faao_mav.optimizer.interior.search import WARM_START
+from faao_mav.optimizer.interior.search import WARM_START, StartStrategy
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates

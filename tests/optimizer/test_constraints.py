@@ -1,4 +1,4 @@
-"""New constraints are one class each: on positions, speeds or accelerations."""
+"""New constraints are one class each: on positions, speeds, accelerations, or a sum."""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -44,11 +44,12 @@ def solved(kin: Kinematics, *constraints: Constraint) -> LocalOptimum:
 
 @dataclass(frozen=True)
 class Side(Constraint):
-    """normal . x <= most of the unknowns x of a slot."""
+    """normal . x <= most of the unknowns x of a slot, or of their mean over the slots."""
 
     of: tuple[int, ...]  # type: ignore[misc]
     normal: tuple[float, float]
     most: float
+    total: bool = False  # type: ignore[misc]
 
     def rows(self, x: Real) -> Rows:
         normal = np.array(self.normal)
@@ -62,6 +63,7 @@ class Side(Constraint):
         Side(W, (0.6, 0.8), 2.83),
         Side(V, (1.0, 0.0), 0.62),
         Side(A, (0.0, 1.0), 0.3),
+        Side(W, (1.0, 1.0), 3.7, True),
     ],
 )
 def test_a_half_plane_is_kept_at_the_global_optimum(make: Any, side: Side) -> None:
@@ -70,7 +72,7 @@ def test_a_half_plane_is_kept_at_the_global_optimum(make: Any, side: Side) -> No
     bounded = flight.a[kin.first_bounded_acceleration : -1]
     x: dict[tuple[int, ...], Any] = {W: flight.w, V: flight.v, A: bounded}
     along = x[side.of] @ np.array(side.normal)
-    kept = along <= side.most
+    kept = (cp.sum(along) / kin.slots if side.total else along) <= side.most
     assert best.value == pytest.approx(global_optimum(kin, flight, [kept]), rel=1e-4)
     assert best.value < unconstrained(kin) - 1e-7  # it is active
 

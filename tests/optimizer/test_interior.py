@@ -16,7 +16,8 @@ from faao_mav.optimizer.interior.chain import Chain
 from faao_mav.optimizer.interior.constraint import Constraint, Grid, V
 from faao_mav.optimizer.interior.energy import EnergyLimit
 from faao_mav.optimizer.interior.maximize import maximize
-from faao_mav.optimizer.interior.rewards import Delivered, Stage, StageValues
+from faao_mav.optimizer.interior.queue import Queue
+from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValues
 from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.scaled import flight_variables
@@ -136,7 +137,11 @@ SCENARIOS: dict[str, tuple[Kinematics, Stage]] = {
     ),
     "hopeless": (plane(50), links(gaussian, 1e-7, 1e-7)),
     "dominated": (plane(50), links(bpsk, 4e5, 4e2)),
-    "one link": (plane(50), links(bpsk, 4e4, 4e4, stations=STATIONS[[0, 0]])),
+    "one link": (plane(50), links(bpsk, 4e4)),
+    "three links": (
+        plane(50),
+        links(bpsk, 4e4, 4e4, 4e4, stations=np.vstack([STATIONS, [[300.0, 0.0]]])),
+    ),
     "far away": (
         plane(300, time_step=0.5, start=np.array([0.0, 3500.0]), end=np.array([3500.0, 0.0])),
         links(gaussian, 1.0, 1.0),
@@ -149,12 +154,15 @@ SCENARIOS: dict[str, tuple[Kinematics, Stage]] = {
 def test_the_optimum_is_feasible_better_and_stationary(name: str) -> None:
     kin, stage = SCENARIOS[name]
     start = straight_flight(kin)
-    best = maximize(kin, stage, start, max_iterations=200 if name == "far away" else 60)
+    best = maximize(kin, stage, start)
     assert worst(kin, best.trajectory) < 1e-6
     assert best.converged
     assert best.residual < 1e-6
+    assert best.iterations <= 60
     assert best.value == reward(stage, best.trajectory)
     assert best.value > reward(stage, start)
+    assert best.weights.min() >= 0
+    assert best.weights.sum() == pytest.approx(1)
     if kin.slots <= 250:
         # no flight within a metre of it gains more than this share of its reward
         assert kkt_residual(kin, stage, best.trajectory) < 1e-5 * best.value
@@ -207,6 +215,7 @@ def test_a_flat_reward_returns_the_start(stage: Stage) -> None:
     assert best.converged
     assert best.iterations == 0
     assert best.value == 2
+    assert best.weights.sum() == 1
 
 
 def test_a_reward_that_fails_somewhere_is_avoided() -> None:
@@ -270,7 +279,7 @@ def test_the_published_rate_is_reached() -> None:
         end_velocity=along,
         bound_first_acceleration=True,
     )
-    stage = links(gaussian, 1e7, 1e7, stations=STATIONS[[0, 0]])
+    stage = links(gaussian, 1e7)
     best = maximize(kin, stage, straight_flight(kin))
     assert best.converged
     assert best.value == pytest.approx(9.522, abs=0.002)
@@ -278,13 +287,17 @@ def test_the_published_rate_is_reached() -> None:
 
 def test_symmetric_problems_have_symmetric_optima() -> None:
     kin = copter(40, start=np.array([-100.0, 0.0]), end=np.array([100.0, 0.0]), time_step=0.5)
-    pair = np.array([[0.0, 80.0], [0.0, -80.0]])
-    one = maximize(kin, links(bpsk, 4e4, 4e4, stations=pair[[0, 0]]), straight_flight(kin))
+    one = maximize(kin, links(bpsk, 4e4, stations=np.array([[0.0, 80.0]])), straight_flight(kin))
     mirrored = one.trajectory.w[::-1] * [-1, 1]
     assert one.trajectory.w == pytest.approx(mirrored, abs=1e-2)
 
+    pair = np.array([[0.0, 80.0], [0.0, -80.0]])
     two = maximize(kin, links(bpsk, 4e4, 4e4, stations=pair), straight_flight(kin))
+    assert two.weights == pytest.approx([0.5, 0.5], abs=1e-3)
     assert abs(two.trajectory.w[:, 1]).max() < 1e-2
+
+    same = maximize(kin, links(bpsk, 4e4, 4e4, stations=pair[[0, 0]]), straight_flight(kin))
+    assert same.value == pytest.approx(one.value, rel=1e-6)
 
 
 def test_the_unit_of_the_reward_does_not_matter() -> None:
@@ -294,6 +307,11 @@ def test_the_unit_of_the_reward_does_not_matter() -> None:
     small = maximize(kin, links(bowl, 1e-17, 2e-17), start)
     assert small.value * 1e12 == pytest.approx(large.value, rel=1e-6)
     assert small.iterations == large.iterations
+
+
+def test_a_link_far_better_than_the_other_has_no_weight() -> None:
+    kin, stage = SCENARIOS["dominated"]
+    assert maximize(kin, stage, straight_flight(kin)).weights == pytest.approx([0, 1], abs=1e-5)
 
 
 def test_the_certificate_sees_what_is_to_be_gained() -> None:
@@ -317,8 +335,8 @@ def chain(rng: np.random.Generator, kin: Kinematics) -> tuple[Chain, Real, Real,
     """The chain of `kin`, random symmetric blocks H (k, k, n), and H and A as dense matrices."""
     grid = Grid.of(kin)
     n, free = kin.slots, np.concatenate([grid.free, np.ones((3, kin.slots), dtype=np.bool_)])
-    goal = Delivered(ACTIVE, np.full((2, n), 80.0), RelayQueue(), kin.time_step)
-    made = Chain(grid, [goal], free)
+    goal = Queue(Rewards(ACTIVE, np.full((2, n), 80.0)), RelayQueue(), kin.time_step)
+    made = Chain(grid, goal, free)
     root = rng.standard_normal((n, 9, 9))
     H = (root + root.swapaxes(1, 2)).transpose(1, 2, 0)
     dense, A = np.zeros((9 * n, 9 * n)), np.zeros((5 * (n - 1), 9 * n))
@@ -339,10 +357,10 @@ def test_the_banded_matrix_is_the_dense_one(seed: int, n: int, hover: bool) -> N
     assert solve is not None
     right = rng.standard_normal((2, 14, n))
     right[:, 9:, -1] = 0
+    found = solve(right)
     kept = made.free.T.ravel()
     whole = np.block([[dense, A.T], [A, np.zeros((len(A), len(A)))]])
-    for given_ in right:
-        solved = solve(given_)
+    for given_, solved in zip(right, found, strict=True):
         of_x, of_y = given_[:9].T.ravel()[kept], given_[9:, :-1].T.ravel()
         expected = np.linalg.solve(whole, np.append(of_x, of_y))
         x, y = solved[:9].T.ravel()[kept], solved[9:, :-1].T.ravel()
@@ -371,8 +389,8 @@ CONSTRAINTS: list[Constraint] = [
     EnergyLimit(RotaryWing(80.0, 90.0, 120.0, 4.0, 0.01, 20.0), 1e4, 0.5, 20.0, 5.0, (1.0, 2.0)),
     EnergyLimit(FixedWing.fitted(90.0, 15.0, 2.5), 1e4, 0.5, 20.0, 5.0, (1.0, 2.0)),
     *(
-        Delivered(ACTIVE, np.full((2, 4), 80.0), relay, 0.5)
-        for relay in (None, RelayQueue(False, 30.0), RelayQueue(True, 30.0))
+        Queue(Rewards(ACTIVE, np.full((2, 4), 80.0)), RelayQueue(half, 30.0), 0.5)
+        for half in (False, True)
     ),
 ]
 
@@ -380,7 +398,8 @@ CONSTRAINTS: list[Constraint] = [
 @pytest.mark.parametrize("constraint", CONSTRAINTS)
 def test_gradients_and_hessians_are_those_of_differences(constraint: Constraint) -> None:
     rng, h = np.random.default_rng(0), 1e-6
-    x = rng.uniform(0.3, 0.7, (len(constraint.of) + constraint.own, 4))
+    own = constraint.slope if isinstance(constraint, Goal) else ()
+    x = rng.uniform(0.3, 0.7, (len(constraint.of) + len(own), 4))
     at = constraint.rows(x)
     assert at.bend is not None
     for place in range(len(x)):

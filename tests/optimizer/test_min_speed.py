@@ -195,11 +195,11 @@ def test_a_least_speed_that_does_not_bind_costs_nothing() -> None:
     assert np.linalg.norm(free.trajectory.v, axis=1).min() > 5
     best = maximize(kin, stage, straight_flight(kin))
     assert best.converged
-    assert best.value >= free.value * (1 - 1e-5)
+    assert best.value == pytest.approx(free.value, rel=1e-5)
 
 
 def test_the_published_flight_is_reached() -> None:
-    """Zeng and Zhang, IEEE TWC 2017, Table II: 9.53 Mbit/s at a mean of 8.16 m/s.
+    """Zeng and Zhang, IEEE TWC 2017, Table II: 9.53 Mbit/s at a mean of 8.16 m/s, 4.89 m/s².
 
     Re-computed by CVXPY: 9.5208, 8.12 and 4.88.
     """
@@ -215,12 +215,13 @@ def test_the_published_flight_is_reached() -> None:
         min_speed=3.0,
     )
     start = straight_flight(kin)
-    stage = links(gaussian, 1e7, 1e7, stations=np.zeros((2, 2)))
+    stage = links(gaussian, 1e7)
     best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=300)
     assert worst(kin, best.trajectory) < 1e-6
     assert reward(stage, start) == pytest.approx(4.01, abs=0.06)
     assert best.value == pytest.approx(9.53, rel=5e-3)
-    assert np.linalg.norm(best.trajectory.v, axis=1).mean() == pytest.approx(8.16, rel=0.04)
+    assert np.linalg.norm(best.trajectory.v, axis=1).mean() == pytest.approx(8.16, rel=0.02)
+    assert np.linalg.norm(best.trajectory.a, axis=1).mean() == pytest.approx(4.89, rel=0.03)
 
 
 PLANE = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}

@@ -106,12 +106,11 @@ def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(
     problem = build_problem(small_plan())
     flight = next(iter(starts_of(problem).values()))
 
-    values = iter((0.5, 0.5 + 1e-15))
+    def ends(*_: object, **__: object) -> list[LocalOptimum]:
+        values = (0.5, 0.5 + 1e-15)
+        return [LocalOptimum(flight, value, np.ones(2), 1, 0.0, True) for value in values]
 
-    def end(*_: object, **__: object) -> LocalOptimum:
-        return LocalOptimum(flight, next(values), 1, 0.0, True)
-
-    monkeypatch.setattr(multistart, "maximize", end)
+    monkeypatch.setattr(multistart, "maximize_all", ends)
     flights, field = {"bs": flight, "user": flight}, rate_field(problem, design(problem.plan))
     found = improve_starts(problem.kinematics, field, flights, tolerance=1e-3, max_iterations=1)
     assert found.promising == ["bs"]

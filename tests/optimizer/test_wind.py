@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_interior import HEIGHT, bowl, links
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.interior.maximize import maximize
@@ -17,6 +16,7 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.starts import even_speed, starts, straight_flight
+from faao_mav.optimizer.search.track import Closeness
 from faao_mav.plan import Wind
 from missions import plan_of
 
@@ -60,11 +60,10 @@ def test_starts_keep_the_limits_or_there_is_none(
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (6.0, 0.0), (-3.0, 4.0), (-5.0, -6.0)])
 def test_the_optimum_of_a_convex_problem_is_clarabels(wind: tuple[float, float]) -> None:
     kin = replace(FREE, wind=wind, end=np.array([30.0, 20.0]))
-    place = np.array([-60.0, 70.0])
-    stage = links(bowl, 1 / LENGTH**2, 1 / LENGTH**2, stations=place + np.zeros((2, 1)))
-    best = maximize(kin, stage, straight_flight(kin), tolerance=1e-6)
+    path = np.tile([-60.0, 70.0], (kin.slots, 1))
+    best = maximize(kin, Closeness(path), straight_flight(kin), tolerance=1e-6)
     flight = flight_variables(kin)
-    apart = cp.sum_squares(flight.w - place[None] / LENGTH) / kin.slots + HEIGHT**2 / LENGTH**2
+    apart = cp.sum_squares(flight.w - path / LENGTH) / kin.slots
     peer = cp.Problem(cp.Minimize(apart), flight.constraints)
     solve(peer)
     assert max(kin.residuals(best.trajectory).values()) < 1e-7

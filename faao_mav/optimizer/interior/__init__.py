@@ -1,13 +1,13 @@
 """The interior-point method: the best flight through smooth rewards, within its constraints.
 
-    maximise  sum_n f_n  of what a relay forwards of two rewards I_U(w_n), I_G(w_n)
+    maximise  min_j F_j(w),  F_j(w) = (1 / n) sum_n f_jn(w_n)  under (11), (12), (13d)-(13f)
 
-under (11), (12), (13d)-(13f) and whatever `Constraint`s are given; without a queue that is the
-smaller of both sums. The rewards (rates of links, for example) may be non-concave: the method finds
-a local optimum near its start, which it never falls below.
+or what a relay's `queue` delivers of two rates f_0n, f_1n, and whatever `Constraint`s are given.
+f (rates of links, for example) may be non-concave: the method finds a local optimum near its
+start, which it never falls below.
 
 Method. All there is are inequalities g(x_n) >= 0 of the unknowns of a slot (position, velocity,
-acceleration, and those of the queue and of the energy), and linear equations from slot to slot. It
+acceleration, and those of the queue) or of their sums, and linear equations from slot to slot. It
 is a primal-dual method with a predictor and a corrector (Mehrotra); inequalities that a start does
 not keep with room to spare are widened by a margin that is driven to zero. A Newton step is one
 banded LU. Of the curvature of the Lagrangian as much counts as leaves the model convex, by Cholesky
@@ -17,8 +17,8 @@ With a least speed, where a flight can turn as a whole, and where a fence turns 
 waits for the iterates.
 
 Files: `maximize` is the entry; `search` iterates, `newton` takes one step, `chain` is its matrix;
-`rewards` is what is maximised, `speed_limits`, `energy` and `fence` what is kept. To add a
-constraint is to write one class: see `constraint`.
+`rewards` and `queue` are what is maximised, `speed_limits`, `energy` and `fence` what is kept. To
+add a constraint is to write one class: see `constraint`.
 
 Units inside: lengths in 100 m, speeds in v_max, accelerations in a_max, rewards summed over the
 slots and divided by the largest gradient at the start.

@@ -5,17 +5,18 @@ multipliers y_n of the equations that lead to the next slot, all of them linear:
 
     w_{n+1} = w_n + advance v_n + bulge a_n,    v_{n+1} = v_n + gain a_n
 
-and what constraints add. Keeping a_n as an unknown keeps the matrix well conditioned where its
-limit is active.
+and what the goal adds. Keeping a_n as an unknown keeps the matrix well conditioned where its limit
+is active.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from scipy.linalg import lapack
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.interior.constraint import COMMON, Constraint, Grid
+from faao_mav.optimizer.interior.constraint import COMMON, Grid
+from faao_mav.optimizer.interior.rewards import Goal
 
 _PENALTY = 1e8
 """What a squared miss of the equations weighs where signs of curvature are told: far more than any
@@ -30,21 +31,16 @@ class Chain:
     unknowns are not given: rows and columns of the others are those of the identity.
     """
 
-    def __init__(self, grid: Grid, constraints: Sequence[Constraint], free: Flags) -> None:
+    def __init__(self, grid: Grid, goal: Goal, free: Flags) -> None:
         self.free, self.moves = free, free * 1.0
         k, n = free.shape
-        e = 4 + sum(len(each.after) for each in constraints)
+        e = 4 + len(goal.after)
         self.after, self.before = np.zeros((2, e, k))
         for axis in (0, 1):
             self.after[axis, axis] = self.after[2 + axis, 2 + axis] = 1
             self.before[axis, [axis, 2 + axis, 4 + axis]] = 1, grid.advance, grid.bulge
             self.before[2 + axis, [2 + axis, 4 + axis]] = 1, grid.gain
-        row, own = 4, COMMON
-        for each in constraints:
-            rows, places = slice(row, row + len(each.after)), slice(own, own + each.own)
-            if len(each.after):
-                self.after[rows, places], self.before[rows, places] = each.after, each.before
-            row, own = rows.stop, places.stop
+        self.after[4:, COMMON:], self.before[4:, COMMON:] = goal.after, goal.before
         self.size = size = k + e
         # a multiplier is as far from an unknown of its slot, and from one of the next, as this
         self._band = band = max(
@@ -99,7 +95,7 @@ class Chain:
         return bool(info == 0)
 
     def factored(self, H: Real) -> Callable[[Real], Real] | None:
-        """Return what solves for a right-hand side (k + e, n); None if the matrix is singular."""
+        """Return what solves for right-hand sides (m, k + e, n); None if the matrix is singular."""
         cells, band, k = self._template.copy(), self._band, len(H)
         masked = self._masked(H)
         for column in range(k):
@@ -109,8 +105,10 @@ class Chain:
         lu, pivots, info = lapack.dgbtrf(flat, band, band, overwrite_ab=True)
 
         def solve(right: Real) -> Real:
-            solved, _ = lapack.dgbtrs(lu, band, band, right.T.reshape(-1, 1), pivots)
-            return np.asarray(solved.reshape(-1, self.size).T)
+            count = len(right)
+            columns = right.transpose(2, 1, 0).reshape(-1, count)
+            solved, _ = lapack.dgbtrs(lu, band, band, columns, pivots)
+            return np.asarray(solved.reshape(-1, self.size, count).transpose(2, 1, 0))
 
         return None if info else solve
 

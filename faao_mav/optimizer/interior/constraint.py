@@ -76,46 +76,32 @@ class Grid:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class StartStrategy:
-    """How a search begins: the first barrier parameter mu, and the share of the `headroom`."""
-
-    mu: float
-    room: float
-
-
 class Constraint(ABC):
-    """Functions g of the unknowns `of` of a slot, then of `own` ones, that are to be at least 0.
+    """Functions g of the unknowns `of` of a slot that are to be at least 0.
 
-    Its own unknowns and those of the next slot keep `after` x_{n+1} = `before` x_n, both (e, own).
-    `turns` tells that g is taken as linear although its gradient turns from step to step. Searches
-    keep g at least `inside`, so that they end within the limit, and begin with at least `headroom`,
-    by a limit that is widened.
+    `total` tells that their sums over the slots are to be so instead; `turns`, that g is taken as
+    linear although its gradient turns from step to step. Searches keep g at least `inside`, so that
+    they end within the limit, and begin with at least `headroom`, by a limit that is widened.
     """
 
     of: ClassVar[tuple[int, ...]]
+    total: ClassVar[bool] = False
     turns: ClassVar[bool] = False
     inside: ClassVar[float] = 1e-5
-    headroom: float = 0.1
-    own: int = 0
-    before: Real = np.zeros((0, 0))
-    after: Real = np.zeros((0, 0))
+    headroom: ClassVar[float] = 0.1
 
     @abstractmethod
     def rows(self, x: Real) -> Rows:
         """Return g at the unknowns x (k, n), in solver units."""
 
-    def begin(self, x: Real, strategy: StartStrategy) -> Real:  # noqa: ARG002
-        """Return its own unknowns (own, n) to begin with where the others are x."""
-        return np.zeros((0, x.shape[1]))
-
-    def free(self, slots: int) -> Flags:
-        """Return which of its own unknowns are not given, (own, `slots`)."""
-        return np.ones((self.own, slots), dtype=np.bool_)
-
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
-        """Return the largest violation by `flight`, in solver units; 0 where the limit holds."""
+        """Return the largest violation by `flight`, in solver units; 0 where the limit holds.
+
+        That of a sum is its mean over the slots.
+        """
         value = self.rows(unknowns(kin, flight)[list(self.of)]).value
+        if self.total:
+            return max(0.0, -float(value.mean(axis=1).min()))
         on = self.on(Grid.of(kin), len(value))
         return max(0.0, -float(value.min(initial=np.inf, where=on)))
 

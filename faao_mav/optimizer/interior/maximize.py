@@ -3,20 +3,15 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import (
-    A,
-    Constraint,
-    StartStrategy,
-    V,
-    every_excess,
-    unknowns,
-)
-from faao_mav.optimizer.interior.rewards import Delivered, Stage
-from faao_mav.optimizer.interior.search import COLD_START, SLOW_START, Search
+from faao_mav.optimizer.interior.constraint import A, Constraint, V, every_excess, unknowns
+from faao_mav.optimizer.interior.queue import Queue
+from faao_mav.optimizer.interior.rewards import Rewards, Stage
+from faao_mav.optimizer.interior.search import COLD_START, SLOW_START, Search, StartStrategy
 from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -27,7 +22,7 @@ _ALLOWED = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class LocalOptimum:
-    """A feasible flight and its value, the smaller of both means or what is delivered.
+    """A feasible flight, its min_j F_j, and the multipliers of t <= F_j, which sum to one.
 
     `residual` is the largest of: the scaled gradient of the Lagrangian, the violation of a
     limit, and the complementarity gap per slot; `converged` tells that it met the tolerance.
@@ -35,6 +30,7 @@ class LocalOptimum:
 
     trajectory: Trajectory
     value: float
+    weights: Real
     iterations: int
     residual: float
     converged: bool
@@ -61,7 +57,7 @@ def maximize(
     >>> from faao_mav.optimizer.interior.rewards import StageValues
     >>> kin = Kinematics(np.zeros(2), np.array([100.0, 0.0]), 41, 0.5, 10.0, 3.0, None, None, True)
     >>> def near(w):  # the reward falls with the squared distance from (50, 40), as 1 / km^2
-    ...     away = np.stack([w - np.array([[50.0], [40.0]])] * 2, axis=1)  # for both hops
+    ...     away = (w - np.array([[50.0], [40.0]]))[:, None]
     ...     packed = np.array([-2e-6, 0, -2e-6])[:, None, None]
     ...     value = -1e-6 * (away * away).sum(axis=0)
     ...     return StageValues(value, -2e-6 * away, np.broadcast_to(packed, (3, *value.shape)))
@@ -71,26 +67,35 @@ def maximize(
     (True, [50.0, 40.0])
     """
     kept = (*constraints_of(kin), *constraints)
-    goal = Delivered(stage, start.w.T, relay, kin.time_step)
-    first = float(objectives(goal.start[:, None], kin, relay)[0])
-    if goal.flat:
-        return LocalOptimum(start, first, 0, 0.0, True)
+    rewards = Rewards(stage, start.w.T)
+    first = float(objectives(rewards.base[:, None], kin, relay)[0])
+    if rewards.flat:
+        means = rewards.base.mean(axis=1)
+        lowest = means == means.min()
+        return LocalOptimum(start, first, lowest / lowest.sum(), 0, 0.0, True)
     search = Search(
         kin,
-        (goal, *kept),
-        goal,
+        kept,
+        rewards if relay is None else Queue(rewards, relay, kin.time_step),
         unknowns(kin, start),
         tolerance=tolerance,
         strategy=strategy or (SLOW_START if kin.min_speed > 0 else COLD_START),
     )
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
-        v = search.run(max_iterations).T * kin.max_speed
-    flight = feasible(kin, start, v, kept)
+        end = search.run(max_iterations)
+    flight = feasible(kin, start, end.v.T * kin.max_speed, kept)
     value = float(objectives(stage(flight.w.T).value[:, None], kin, relay)[0])
-    converged = search.converged and value > first - tolerance * abs(first)
+    converged = end.converged and value > first - tolerance * abs(first)
     if not value >= first:
         flight, value = start, first
-    return LocalOptimum(flight, value, search.iterations, search.residual, converged)
+    return LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
+
+
+def maximize_all(
+    kin: Kinematics, stage: Stage, starts: Sequence[Trajectory], **options: Any
+) -> list[LocalOptimum]:
+    """Return what `maximize` finds from each of the `starts`."""
+    return [maximize(kin, stage, start, **options) for start in starts]
 
 
 def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:

@@ -7,13 +7,13 @@ iterates that hug the limits are given multipliers from a larger mu.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, StartStrategy, V
-from faao_mav.optimizer.interior.newton import Direction, Iterate, Newton, System
+from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, V
+from faao_mav.optimizer.interior.newton import Direction, Functions, Iterate, Newton, System
 from faao_mav.optimizer.interior.rewards import Goal
 from faao_mav.optimizer.kinematics import Kinematics
 
@@ -61,6 +61,14 @@ _LEFT = 0.1
 where an obstacle's nearest side changes, g may be below 0 after a step that ends above. Chosen."""
 
 
+@dataclass(frozen=True, slots=True)
+class StartStrategy:
+    """How a search begins: the first barrier parameter mu, and the share of the `headroom`."""
+
+    mu: float
+    room: float
+
+
 COLD_START = StartStrategy(mu=10.0, room=1.0)
 """For any start: the optimum may be far away."""
 
@@ -71,11 +79,36 @@ WARM_START = StartStrategy(mu=1e-2, room=0.03)
 """For starts that are nearly optimal."""
 
 
-class Search:
-    """A search from the unknowns w, v, a (6, n) of a start, in solver units.
+@dataclass(frozen=True, slots=True)
+class SearchResult:
+    """Where a search ended: scaled speeds v (2, n), and the rest as in `LocalOptimum`."""
 
-    `residual` is where it is, as in `LocalOptimum`, after so many `iterations`.
+    v: Real
+    weights: Real
+    iterations: int
+    residual: float
+    converged: bool
+
+
+def best_floor(total: Real, weight: float) -> float:
+    """Return the t that maximises t + `weight` sum_j log(total_j - t) of `total` (J,).
+
+    >>> best_floor(np.array([3.0]), 0.5)
+    2.5
     """
+    floor = float(total.min()) - weight
+    # from above the optimum, where the gradient is convex in t, Newton's method is monotone
+    for _ in range(50):
+        per_gap = 1 / (total - floor)
+        excess = weight * float(per_gap.sum()) - 1
+        if abs(excess) < 1e-12:
+            break
+        floor -= excess / (weight * float((per_gap * per_gap).sum()))
+    return floor
+
+
+class Search:
+    """A search from the unknowns w, v, a (6, n) of a start, in solver units."""
 
     def __init__(
         self,
@@ -89,44 +122,72 @@ class Search:
     ) -> None:
         """Begin at x."""
         self.goal, self.tolerance, self.mu = goal, tolerance, strategy.mu
-        self.system = system = System(Grid.of(kin), goal, constraints, x, strategy=strategy)
+        x = np.concatenate([x, goal.begin(cold=strategy.room >= 1)])
+        self.system = system = System(Grid.of(kin), goal, constraints, x)
         # where half-planes turn, or a flight may turn as a whole, mu waits for the iterates
         self.waits = kin.min_speed > 0 or bool(system.turns.any())
-        at = system.at(system.x)
+        at = system.at(x)
         s = np.maximum(at.values, strategy.room * system.headroom)
         y = np.zeros((len(system.chain.after), kin.slots - 1))
-        self.iterate = Iterate(at, y, s, self.mu / s, s - at.values)
-        self.proximal, self.steepness, self.residual = 0.0, 1.0, np.inf
+        floor, s = self._floor(at, s)
+        z = np.where(system.floored, 1.0, system.weight * self.mu) / s
+        self.iterate = Iterate(
+            at, y, s, self._weighted(z), np.where(system.floored, 0.0, s - at.values), floor
+        )
+        self.proximal, self.steepness = 0.0, 1.0
         self.iterations = self.attempts = self.short = self.centrings = 0
         self.best, self.best_v = -np.inf, x[list(V)]
 
-    def run(self, max_iterations: int) -> Real:
-        """Iterate until the search has ended; return the scaled speeds v (2, n) where it did."""
+    def run(self, max_iterations: int) -> SearchResult:
+        """Iterate until the search has ended."""
         while True:
-            slope, self.residual = self._measure()
-            ended = self.converged or not np.isfinite(self.residual)  # the limits have no interior
+            slope, residual = self._measure()
+            converged = residual < self.tolerance
             lost = self.iterations >= max_iterations or self.centrings > _MAX_CENTRINGS
-            if ended or (lost and not self.attempts):
-                return self.best_v if self.best > -np.inf else self.iterate.at.x[list(V)]
+            # not finite: the limits have no interior left
+            if converged or not np.isfinite(residual) or (lost and not self.attempts):
+                weights = self.iterate.z[self.system.floored]
+                v = self.best_v if self.best > -np.inf else self.iterate.at.x[list(V)]
+                return SearchResult(
+                    v,
+                    weights,
+                    self.iterations,
+                    residual if np.isfinite(residual) else np.inf,
+                    bool(converged),
+                )
             self._advance(slope)
 
-    @property
-    def converged(self) -> bool:
-        """Whether the residual is below the tolerance."""
-        return bool(self.residual < self.tolerance)
+    def _floor(self, at: Functions, s: Real) -> tuple[float, Real]:
+        """Return t at its optimum, and the slacks s (m,) with those of the rewards above t."""
+        floored = self.system.floored
+        if not floored.any():
+            return 0.0, s
+        floor = best_floor(at.values[floored], self.mu * float(self.system.weight[floored][0]))
+        return floor, np.where(floored, at.values - floor, s)
+
+    def _weighted(self, z: Real) -> Real:
+        """Return the multipliers z (m,) with those of the rewards summing to one."""
+        floored = self.system.floored
+        return np.where(floored, z / float(z[floored].sum()), z) if floored.any() else z
+
+    def _value(self, at: Functions) -> float:
+        """Return what is maximised."""
+        if self.goal.total:
+            return float(at.values[self.system.floored].min())
+        return float((self.system.objective * at.x).sum())
 
     def _measure(self) -> tuple[float, float]:
         """Return the scaled gradient of the Lagrangian and the residual; note the best iterate."""
         system, it = self.system, self.iterate
         at, n = it.at, it.at.x.shape[1]
-        gradient = system.pull(at, it.z) - system.chain.pull(it.y)
+        gradient = system.objective + system.pull(at, it.z) - system.chain.pull(it.y)
         slope, gap = float(np.abs(gradient).max()), float((it.s * it.z).sum())
         slope /= max(1.0, float(it.z.sum() + np.abs(it.y).sum()) / (80 * n))
         # what is missed in second order counts tenfold
-        broken = 10 * float(np.abs(it.margin).max())
+        broken = 10 * float((system.each * np.abs(it.margin)).max())
         broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
         broken *= max(1.0, self.tolerance / _STRICT)
-        value = float(at.worth.value.sum())
+        value = self._value(at)
         if broken < self.tolerance and value > self.best:
             self.best, self.best_v = value, at.x[list(V)]
         # where the rewards are steeper than at the start, their unit is larger
@@ -141,11 +202,9 @@ class Search:
         share = 0.0
         try:
             newton = Newton(self.system, self.iterate, self.proximal * self.steepness)
-            it = self.iterate
-            ahead = newton.direction(np.zeros_like(it.s))
+            ahead = newton.predictor()
             self._choose_mu(slope, ahead)
-            corrected = min(1.0, self._reach(ahead)) ** 2 * ahead.s * ahead.z
-            direction = newton.direction((self.mu - corrected) / it.s)
+            direction = newton.corrector(self.mu, ahead, min(1.0, self._reach(ahead)))
         except np.linalg.LinAlgError:
             self.attempts = _MAX_ATTEMPTS
         else:
@@ -179,11 +238,14 @@ class Search:
             solved = slope * self.steepness < _SOLVED * self.mu or slope < self.tolerance
             self.mu *= _FALL if solved else 1.0
         else:
-            now, reach = float((it.s * it.z).mean()), min(1.0, self._reach(ahead))
-            left = float(((it.s + reach * ahead.s) * (it.z + reach * ahead.z)).mean())
+            now, reach = self._mean_gap(it.s, it.z), min(1.0, self._reach(ahead))
+            left = self._mean_gap(it.s + reach * ahead.s, it.z + reach * ahead.z)
             self.mu = min(self.mu, max((left / now) ** 3, _SLOWEST) * now)
-        per_slot = len(it.s) / it.at.x.shape[1]
+        per_slot = float(self.system.weight.sum()) / it.at.x.shape[1]
         self.mu = max(self.mu, self.tolerance * _LEAST_GAP * self.steepness / per_slot)
+
+    def _mean_gap(self, s: Real, z: Real) -> float:
+        return float((s * z).sum() / self.system.weight.sum())
 
     def _reach(self, step: Direction) -> float:
         """Return the share of `step` at which a slack or a multiplier vanishes."""
@@ -197,14 +259,12 @@ class Search:
         if not np.isfinite(step.x).all():
             return False
         at = system.at(it.at.x + share * step.x)
-        if not np.isfinite(at.values.sum()):
+        if not at.finite:
             return False
         s, z = it.s + share * step.s, it.z + share * step.z
-        margin = s - at.values
+        margin = s - at.values + (it.floor + share * step.floor) * system.floored
         more = z * (margin - (1 - share) * it.margin)
-        risen = at.worth.value.sum() - it.at.worth.value.sum()
-        missing = float(more[~system.turns].sum() - risen)
-        missing += share * float((it.at.worth.slope[0] * step.x).sum())
+        missing = float(more[~system.turns].sum())
         bend = newton.bend(step)
         decrease = bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
         missing -= share**2 / 2 * bend
@@ -215,13 +275,17 @@ class Search:
         margin = np.where(system.turns, left, margin)
         s = np.where(system.turns, at.values + left, s)
         y = it.y + (1.0 if self.iterations == 1 else share) * step.y
-        self.iterate = Iterate(at, y, s, z, margin)
+        floor, s = self._floor(at, s)
+        margin = np.where(system.floored, 0.0, margin)
+        self.iterate = Iterate(at, y, s, self._weighted(z), margin, floor)
         return True
 
     def _centre(self) -> None:
         """Give the iterate multipliers from a larger mu: that leads away from limits."""
         it = self.iterate
-        self.mu = min(COLD_START.mu * self.steepness, _CENTRING * float((it.s * it.z).mean()))
-        self.iterate = replace(it, z=self.mu / it.s)
+        self.mu = min(COLD_START.mu * self.steepness, _CENTRING * self._mean_gap(it.s, it.z))
+        floor, s = self._floor(it.at, it.s)
+        z = np.where(self.system.floored, it.z, self.system.weight * self.mu / s)
+        self.iterate = replace(it, s=s, z=z, floor=floor)
         self.proximal, self.attempts, self.short = 0.0, 0, 0
         self.centrings += 1

@@ -78,7 +78,7 @@ class ConvexObstacles:
         piece, a, b = near[0], a[:, near[1], near[2]], b[:, near[1], near[2]]
         best = self._best(piece, a, b)
         u[0][near], u[1][near] = best
-        h[near] = self._support(piece, best)
+        h[near] = self._support(piece, best)[0]
         return u, h
 
     def _best(self, piece: Integers, a: Real, b: Real) -> Real:
@@ -96,23 +96,23 @@ class ConvexObstacles:
     def _candidates(self, piece: Integers, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
         for normals, offsets in zip(*self._sides, strict=True):
             yield normals[:, piece], offsets[piece]
-        along = _unit(b - a)
-        across = np.stack([-along[1], along[0]])
+        across = _across(_unit(b - a))
         for side in (across, -across):
-            yield side, self._support(piece, side)
+            yield side, self._support(piece, side)[0]
         corners = self.corners[piece].transpose(2, 1, 0)
         for end in (a, b):
             square = (corners[0] - end[0]) ** 2 + (corners[1] - end[1]) ** 2
             nearest = square.argmin(axis=0)
             away = end - corners[:, nearest, np.arange(len(piece))]
             u = _unit(away)
-            yield u, self._support(piece, u)
+            yield u, self._support(piece, u)[0]
 
-    def _support(self, piece: Integers, u: Real) -> Real:
-        """Return h(u) (m,) of obstacles `piece`."""
+    def _support(self, piece: Integers, u: Real) -> tuple[Real, Real]:
+        """Return h(u) (m,) of obstacles `piece` and the corners p (2, m) with h = u . p + r."""
         corners = self.corners[piece].transpose(2, 1, 0)
         along = corners[0] * u[0] + corners[1] * u[1]
-        return np.asarray(along.max(axis=0) + self.radius[piece])
+        farthest, every = along.argmax(axis=0), np.arange(len(piece))
+        return along[farthest, every] + self.radius[piece], corners[:, farthest, every]
 
 
 def _unit(vectors: Real) -> Real:
@@ -122,6 +122,11 @@ def _unit(vectors: Real) -> Real:
     unit[0] = np.where(length > _SHORTEST, unit[0], 1.0)
     unit[1] = np.where(length > _SHORTEST, unit[1], 0.0)
     return np.asarray(unit)
+
+
+def _across(u: Real) -> Real:
+    """Return u, turned left by a right angle."""
+    return np.stack([-u[1], u[0]])
 
 
 def _dot(x: Real, y: Real) -> Real:

@@ -1,4 +1,4 @@
-"""Improve all starts roughly, and choose those to improve to the end.
+"""Improve all starts roughly, side by side, and choose those to improve to the end.
 
 Long flights are improved on a coarse copy with fewer slots, which costs a fraction of the time.
 """
@@ -10,7 +10,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import Constraint
-from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize
+from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize_all
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -92,18 +92,15 @@ def improve_starts(
         copy, reward = coarse_copy(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
         tolerance = max(tolerance, _COARSE_TOLERANCE)
         on_copy = [copy.follow(resampled(kin, flight, copy)) for flight in on_copy]
-    solved = [
-        maximize(
-            copy,
-            reward,
-            start,
-            constraints=constraints(copy),
-            tolerance=tolerance,
-            max_iterations=max_iterations,
-            relay=relay,
-        )
-        for start in on_copy
-    ]
+    solved = maximize_all(
+        copy,
+        reward,
+        on_copy,
+        constraints=constraints(copy),
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        relay=relay,
+    )
     optima = dict(zip(flights, solved, strict=True))
     best = max(optimum.value for optimum in solved)
     least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)

@@ -6,12 +6,14 @@ near the path each obstacle is left on the path's side.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import Constraint, Rows, every_excess, unknowns
+from faao_mav.optimizer.interior.constraint import Constraint, every_excess, unknowns
 from faao_mav.optimizer.interior.maximize import constraints_of
+from faao_mav.optimizer.interior.rewards import Rewards, StageValues
 from faao_mav.optimizer.interior.search import COLD_START, Search
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
@@ -29,26 +31,20 @@ _LOOK = 5
 Chosen."""
 
 
+@dataclass(frozen=True)
 class Closeness:
-    """The goal -sum_n ||w_n - r_n||^2 of being near a path r (n, 2), m.
+    """The reward of being near a path r: -||w_n - r_n||^2 in units of `LENGTH`, r (n, 2) in m."""
 
-    The unit is the largest gradient at the start w (n, 2).
-    """
+    path: Real
 
-    noise = 1e-9
-    held: tuple[int, ...] = ()
-
-    def __init__(self, path: Real, w: Real) -> None:
-        self.path = path.T / LENGTH
-        self.unit = 2 * float(np.abs(path - w).max()) / LENGTH
-
-    def worth(self, x: Real) -> Rows:
-        """Return -||w_n - r_n||^2 of unknowns x that begin with w."""
-        away = x[:2] - self.path
-        slope, bend = np.zeros((1, *x.shape)), np.zeros((1, len(x), *x.shape))
-        slope[0, :2] = -2 * away / self.unit
-        bend[0, [0, 1], [0, 1]] = -2 / self.unit
-        return Rows(-(away**2).sum(axis=0)[None] / self.unit, slope, bend)
+    def __call__(self, w: Real) -> StageValues:
+        """Return the rewards at w (2, ..., n), m."""
+        away = (w - self.path.T.reshape(2, *[1] * (w.ndim - 2), -1))[:, None] / LENGTH
+        value = -(away * away).sum(axis=0)
+        hessian = np.broadcast_to(
+            np.array([-2.0, 0.0, -2.0]).reshape(3, *[1] * value.ndim), (3, *value.shape)
+        )
+        return StageValues(value, -2 * away / LENGTH, hessian / LENGTH**2)
 
 
 def nearest_flight(
@@ -67,17 +63,17 @@ def nearest_flight(
     """
     for kept in ((), tuple(constraints)) if constraints else ((),):
         every = (*constraints_of(kin), *kept)
-        goal = Closeness(path, start.w)
-        if goal.unit < _TOLERANCE:
+        rewards = Rewards(Closeness(path), start.w.T)
+        if rewards.flat:
             continue
         search = Search(
-            kin, every, goal, unknowns(kin, start), tolerance=_TOLERANCE, strategy=COLD_START
+            kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, strategy=COLD_START
         )
         for most in range(_LOOK, steps + _LOOK, _LOOK) if first else (steps,):
             with np.errstate(all="ignore"):
-                v = search.run(min(most, steps))
-            start = kin.follow(v.T * kin.max_speed)
-            if search.converged or (first and _keeps(kin, every, start)):
+                found = search.run(min(most, steps))
+            start = kin.follow(found.v.T * kin.max_speed)
+            if found.converged or (first and _keeps(kin, every, start)):
                 break
     return start if _keeps(kin, (*constraints_of(kin), *constraints), start) else None
 
