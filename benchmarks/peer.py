@@ -20,6 +20,7 @@ from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.starts import starts
+from faao_mav.radio.gain import PathGain
 from faao_mav.radio.relay import RelayQueue
 
 LENGTH = 100.0
@@ -46,6 +47,7 @@ class ClassRate:
     @property
     def gain(self) -> float:
         """g at the foot of the station: c times it is of the order of one to a hundred."""
+        assert isinstance(self.link.law, PathGain)
         return self.link.law.reference_gain / self.link.altitude**2
 
 
@@ -130,6 +132,7 @@ def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     p, H = rate.link.station / LENGTH, rate.link.altitude / LENGTH
     away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
     law, squared = rate.link.law, ca.sum1(away**2) + H**2
+    assert isinstance(law, PathGain)
     s = H / ca.sqrt(squared)
     terms = sum(c * s**k for k, c in enumerate(law.elevation_db, 1)) * np.log(10) / 10
     gain_log = terms - law.exponent / 2 * ca.log(squared * LENGTH**2)

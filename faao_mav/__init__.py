@@ -15,9 +15,10 @@ The public names, which are imported when they are first used:
   `render_parameters`, `Vehicle`, `predict`, `Track`, `check`, `Check`, `Finding`, `Limits`,
   `LinkCheck`
 - on the vehicle: `upload`, `download`, `fly_mission`, `Flight`, `read_log`, `debrief`
-- the radio: `PathGain`, `fit_link`, `LinkFit`, `Samples`, `read_measured`
+- the radio: `PathGain`, `GainFunction`, `StreamRate`, `OwnParts`, `fit_link`, `LinkFit`, `Samples`, `read_measured`
 - many plans: `run_study`, `make_cases`, `parse_vary`, `StudyRow`, `as_array`
-- figures and pages: `flight_figure`, `route_figure`, `study_figure`, `save_figure`, `render_report`
+- figures and pages: `flight_figure`, `route_figure`, `study_figure`, `save_figure`,
+  `render_report`
 - errors: `FaaoError`, `InputError`, `PlanError`, `MissionFileError`, `ParameterFileError`,
   `InfeasibleError`, `SolverError`, `LinkError`
 """
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.optimize import optimize as optimize
     from faao_mav.optimizer.pricing import price as price
     from faao_mav.optimizer.pricing import saturation as saturation
+    from faao_mav.optimizer.problem import OwnParts as OwnParts
     from faao_mav.optimizer.problem import Problem as Problem
     from faao_mav.optimizer.problem import build_problem as build_problem
     from faao_mav.optimizer.search.bound import upper_bound as upper_bound
@@ -61,8 +63,10 @@ if TYPE_CHECKING:
     from faao_mav.radio.fit import LinkFit as LinkFit
     from faao_mav.radio.fit import Samples as Samples
     from faao_mav.radio.fit import fit_link as fit_link
+    from faao_mav.radio.gain import GainFunction as GainFunction
     from faao_mav.radio.gain import PathGain as PathGain
     from faao_mav.radio.measured import read_measured as read_measured
+    from faao_mav.radio.rate_steps import StreamRate as StreamRate
     from faao_mav.report.debrief import debrief as debrief
     from faao_mav.report.figures import flight_figure as flight_figure
     from faao_mav.report.figures import route_figure as route_figure
@@ -99,13 +103,14 @@ _HOMES = {
     "mission.formats.parameter_file": "read_parameters render_parameters",
     "optimizer.optimize": "optimize",
     "optimizer.pricing": "price saturation",
-    "optimizer.problem": "Problem build_problem",
+    "optimizer.problem": "OwnParts Problem build_problem",
     "optimizer.search.bound": "upper_bound",
     "optimizer.solution": "Solution load_solution save_solution",
     "plan": "Plan parse_plan read_plan",
     "radio.fit": "LinkFit Samples fit_link",
-    "radio.gain": "PathGain",
+    "radio.gain": "GainFunction PathGain",
     "radio.measured": "read_measured",
+    "radio.rate_steps": "StreamRate",
     "report.debrief": "debrief",
     "report.figures": "flight_figure route_figure",
     "report.page": "render_report",

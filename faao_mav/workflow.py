@@ -7,7 +7,7 @@ import time
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from faao_mav.optimizer.pricing import (
     price,
     saturation,
 )
+from faao_mav.optimizer.problem import OwnParts
 from faao_mav.optimizer.shadowing import Shadowed, shadowed
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan
@@ -292,27 +293,34 @@ def rates_as_dict(plan: Plan, rates: Rates, delivered: float) -> dict[str, Any]:
     }
 
 
-def optimize_plan(plan: Plan, *, observe: Observer | None = None) -> Result:
+def optimize_plan(
+    plan: Plan, *, observe: Observer | None = None, **parts: Unpack[OwnParts]
+) -> Result:
     """Return the solution of `plan` with its mutual information: all that a study's row needs.
 
-    `observe` is told the progress. Raises what `optimize` raises.
+    `observe` is told the progress; `parts` are one's own. Raises what `optimize` raises.
     """
     from faao_mav.optimizer.optimize import optimize
 
     started = time.perf_counter()
-    solution = optimize(plan, observe=observe)
+    solution = optimize(plan, observe=observe, **parts)
     seconds = time.perf_counter() - started
-    information = price(solution) if plan.radio.rates is None else None
+    information = price(solution) if solution.problem.uav_user.steps is None else None
     return Result(solution, information, seconds_optimize=seconds)
 
 
-def plan_mission(plan: Plan, *, bound: bool = False, observe: Observer | None = None) -> Result:
+def plan_mission(
+    plan: Plan,
+    *,
+    bound: bool = False,
+    observe: Observer | None = None,
+    **parts: Unpack[OwnParts],
+) -> Result:
     """Optimise the flight of `plan` and make the mission that flies it.
 
-    With `bound` what no route can exceed is computed too; `observe` is told the progress. A flight
-    that no mission can be made of is a result without a mission: see `Result.no_mission`. Raises
-    `PlanError` when the plan asks for more than the method can handle, `InfeasibleError` when no
-    flight satisfies it.
+    With `bound` what no route can exceed is computed too; `observe` is told the progress; `parts`
+    are one's own, see `OwnParts`. A flight that no mission can be made of is a result without a
+    mission: see `Result.no_mission`. Raises what `optimize` raises.
 
     >>> from faao_mav import read_plan
     >>> result = plan_mission(read_plan("missions/copter_relay.yaml"))
@@ -324,7 +332,7 @@ def plan_mission(plan: Plan, *, bound: bool = False, observe: Observer | None = 
     ['WPNAV_ACCEL', 'WPNAV_JERK']
     """
     started = time.perf_counter()
-    result = optimize_plan(plan, observe=observe)
+    result = optimize_plan(plan, observe=observe, **parts)
     solution = result.solution
     if observe is not None:
         observe(Progress(1, 1, "the mission's timing", solution.history[-1]))

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
-from faao_mav.optimizer.problem import Link
+from faao_mav.optimizer.problem import Link, OwnPrecoder
 from faao_mav.plan import Plan
 from faao_mav.radio.precoder import SCHEMES
 
@@ -27,21 +27,23 @@ class Design:
         gaussian: the rate that counts is that of Gaussian inputs.
         averaged: the fading is averaged over; H has a leading axis of draws.
         blind: one precoder serves all draws (statistical CSI); otherwise each draw has its own.
+        own: a precoder of one's own, in place of that scheme.
 
     >>> from faao_mav import read_plan
     >>> design(read_plan("missions/paper.yaml"))
-    Design(scheme='faao', gaussian=False, averaged=False, blind=False)
+    Design(scheme='faao', gaussian=False, averaged=False, blind=False, own=None)
     """
 
     scheme: str
     gaussian: bool
     averaged: bool
     blind: bool
+    own: OwnPrecoder | None = None
 
     @property
     def optimal(self) -> bool:
         """Whether precoders maximise the rate that counts, `Link.measure`."""
-        return self.scheme == "faao" and not self.gaussian
+        return self.scheme == "faao" and not self.gaussian and self.own is None
 
     def precoders(self, link: Link, H: Draws, start: Complex | None = None) -> Complex:
         """Return precoders (..., N_t, N_t) of power W for the channels `H`.
@@ -55,7 +57,7 @@ class Design:
             return link.best(draws, start)
         H = H.mean(axis=0) if self.blind else H
         scheme = "waterfilling" if self.scheme == "faao" else self.scheme
-        return SCHEMES[scheme](H, power, noise)
+        return (self.own or SCHEMES[scheme])(H, power, noise)
 
     def rate(self, link: Link, H: Draws, P: Complex) -> Real:
         """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""
@@ -63,14 +65,15 @@ class Design:
         return np.asarray(rate.mean(axis=0)) if self.averaged else rate
 
 
-def design(plan: Plan) -> Design:
-    """Return the design that `plan` asks for."""
+def design(plan: Plan, own: OwnPrecoder | None = None) -> Design:
+    """Return the design that `plan` asks for, with a precoder of one's `own` where given."""
     averaged = plan.radio.fading == "ergodic"
     return Design(
         scheme=plan.optimizer.precoder,
         gaussian=plan.optimizer.inputs == "gaussian",
         averaged=averaged,
         blind=averaged and plan.radio.csi == "statistical",
+        own=own,
     )
 
 

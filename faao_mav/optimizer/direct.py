@@ -39,6 +39,7 @@ from faao_mav.optimizer.search.starts import by_name, starts
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
+from faao_mav.radio.rate_steps import RateSteps
 
 _LONG_SEARCH = 6
 """By how many times `optimizer.max_iterations` may be exceeded. Chosen: half-duplex plans with a
@@ -73,7 +74,7 @@ def direct(
     all.
     """
     options, kin, relay = problem.plan.optimizer, problem.kinematics, problem.maximised_queue
-    scheme = design(problem.plan)
+    scheme = design(problem.plan, problem.precoder)
     counts_cutoff = options.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
 
@@ -104,7 +105,8 @@ def direct(
     going = [rough.flights[name] for name in rough.promising]
     if (first := int(values.argmax())) < len(routes):  # no start was improved as far
         going.append(flights[first])
-    told = scheme.gaussian or problem.plan.radio.rates is not None
+    steps_of_rates = problem.uav_user.steps
+    told = scheme.gaussian or steps_of_rates is not None
     if told:  # what is reported are the rates of the alphabet, or the steps themselves
         values = np.array([_worth(problem, f.w, _designed(problem, scheme, f.w)) for f in flights])
     tell(2, "the best start", float(values.max()))
@@ -114,7 +116,7 @@ def direct(
         promising = zip(rough.promising, optima, strict=False)
         by_start |= {name: optimum.value for name, optimum in promising}
     best = _best(problem, field, optima)
-    if problem.plan.radio.rates is not None:
+    if isinstance(steps_of_rates, RateSteps):
         start = replace(best, trajectory=flights[int(values.argmax())])
         best = _sharpened(problem, scheme, [*optima, start], steps)
     if spread_known(problem):

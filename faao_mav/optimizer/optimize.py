@@ -1,16 +1,24 @@
 """Plan -> Solution, by the method that the plan asks for."""
 
-from faao_mav.optimizer.problem import build_problem
+from typing import Unpack
+
+from faao_mav.errors import InputError
+from faao_mav.optimizer.problem import OwnParts, build_problem
 from faao_mav.optimizer.solution import Observer, Solution
 from faao_mav.plan import Plan
 
 
-def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
+def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[OwnParts]) -> Solution:
     """Optimise trajectory and precoders of `plan` by `optimizer.method`, for its `goal`.
 
-    `observe` is told the progress. Raises `PlanError` when the plan asks for more than the
-    method can handle, `InfeasibleError` when no flight satisfies it.
+    `observe` is told the progress; `parts` are one's own, see `OwnParts`. Raises `PlanError` when
+    the plan asks for more than the method can handle, `InfeasibleError` when no flight satisfies
+    it, `InputError` for parts with a goal or Algorithm 1.
     """
+    if parts and (plan.goal.minimise or plan.goal.maximise == "data"):
+        raise InputError(f"{', '.join(parts)}: a plan with a goal takes no parts of one's own")
+    if parts and plan.optimizer.method == "algorithm1":
+        raise InputError(f"{', '.join(parts)}: Algorithm 1 takes no parts of one's own")
     if plan.goal.minimise is not None:
         from faao_mav.optimizer.goal import least
 
@@ -19,7 +27,7 @@ def optimize(plan: Plan, *, observe: Observer | None = None) -> Solution:
         from faao_mav.optimizer.most_data import most_data
 
         return most_data(plan, observe=observe)
-    problem = build_problem(plan)
+    problem = build_problem(plan, **parts)
     if plan.optimizer.method == "algorithm1":
         from faao_mav.optimizer.algorithm1 import algorithm1  # CVXPY takes half a second
 

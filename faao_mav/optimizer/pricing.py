@@ -74,7 +74,7 @@ def price(solution: Solution) -> MutualInformation:
     The noises are fixed: the same plan gives the same value. Raises `InputError` for a plan whose
     `radio.rates` take the place of the alphabet.
     """
-    if solution.plan.radio.rates is not None:
+    if solution.problem.uav_user.steps is not None:
         raise InputError("radio.rates: rates of the radio's own have no mutual information")
     problem = solution.problem
     (bs_uav, I_U, first), (uav_user, I_G, second) = (
@@ -149,13 +149,13 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     for precoders that know the draw) every so many slots. What is delivered is the mean over
     flights that have one of the draws in each slot, forwarded with the planned shares.
     """
-    problem, how = solution.problem, design(solution.plan)
+    problem, how = solution.problem, design(solution.plan, solution.problem.precoder)
     if not how.averaged:
         return None
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
     slots = len(solution.w)
     quick = how.blind and solution.plan.optimizer.rate == "cutoff"
-    if solution.plan.radio.rates is None:
+    if solution.problem.uav_user.steps is None:
         quick &= all(len(link.classes.vectors) <= _FEW_CLASSES for link in problem.links)
     step = -(-slots // (_FRESH_SLOTS if quick else _FEW_FRESH_SLOTS))
     chosen = np.arange(step // 2, slots, step)

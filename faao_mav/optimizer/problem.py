@@ -1,13 +1,14 @@
 """Everything that (13) needs, as arrays."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias, TypedDict, Unpack
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
@@ -25,14 +26,19 @@ from faao_mav.radio.constellation import (
     DifferenceClasses,
     difference_classes,
 )
-from faao_mav.radio.gain import PathGain
+from faao_mav.radio.gain import GainFunction
 from faao_mav.radio.rate import Measure, draw_rates
-from faao_mav.radio.rate_steps import RateSteps, one_stream
+from faao_mav.radio.rate_steps import StreamRate, one_stream
 from faao_mav.radio.relay import RelayQueue
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.interior.constraint import Constraint
     from faao_mav.optimizer.interior.energy import EnergyLimit
+
+
+OwnPrecoder: TypeAlias = Callable[[RealOrComplex, float, float], Complex]
+"""A precoder of one's own: from channels (..., N_r, N_t), the power W and the noise sigma², W, it
+makes the P (..., N_t, N_t), tr(P P^H) = W, of each."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +62,12 @@ class Link:
     receive: int
     transmit: int
     modulation: str
-    law: PathGain
+    law: GainFunction
     rician_factor: float
     line_of_sight: str
     nlos: Complex | None
     measure: Measure = "cutoff"
-    steps: RateSteps | None = None
+    steps: StreamRate | None = None
 
     @cached_property
     def classes(self) -> DifferenceClasses:
@@ -177,7 +183,8 @@ class Link:
 class Problem:
     """Problem (13) of `plan`: the feasible flights, the two links and the relay's queue.
 
-    `energy` is what flight and relay may take, J.
+    `energy` is what flight and relay may take, J. A `precoder` of one's own takes the place of the
+    plan's.
     """
 
     plan: Plan
@@ -185,6 +192,7 @@ class Problem:
     bs_uav: Link
     uav_user: Link
     energy: float = math.inf
+    precoder: OwnPrecoder | None = None
 
     def __repr__(self) -> str:
         """Say whose problem it is, in a line."""
@@ -270,13 +278,26 @@ def counted_as_cutoff(problem: Problem) -> Problem:
     )
 
 
-def build_problem(plan: Plan) -> Problem:
-    """Turn `plan` into arrays; the fading is drawn from its seed.
+class OwnParts(TypedDict, total=False):
+    """Parts of the radio that are one's own, in place of the plan's.
+
+    `gain` is the law of both hops, `rate` that of one stream over its SNR, `precoder` a function
+    as `OwnPrecoder` says. A saved result does not have them.
+    """
+
+    gain: GainFunction
+    rate: StreamRate
+    precoder: OwnPrecoder
+
+
+def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
+    """Turn `plan` into arrays; the fading is drawn from its seed. `parts` are one's own.
 
     Raises `PlanError` when the plan is larger than ``size.check_size`` accepts.
     """
     check_size(plan)
     radio, slots = plan.radio, plan.flight.slots
+    laws = (parts["gain"],) * 2 if "gain" in parts else radio.path_gains
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
     rng = np.random.default_rng(radio.seed)
 
@@ -288,7 +309,7 @@ def build_problem(plan: Plan) -> Problem:
         transmit: int,
         power: float,
         noise: float,
-        law: PathGain,
+        law: GainFunction,
     ) -> Link:
         match radio.fading:
             case "realization":
@@ -312,7 +333,7 @@ def build_problem(plan: Plan) -> Problem:
             line_of_sight=radio.line_of_sight,
             nlos=nlos,
             measure=plan.optimizer.rate,
-            steps=radio.rate_steps,
+            steps=parts.get("rate", radio.rate_steps),
         )
 
     return Problem(
@@ -326,7 +347,7 @@ def build_problem(plan: Plan) -> Problem:
             base.antennas,
             base.power,
             relay.noise,
-            radio.path_gains[0],
+            laws[0],
         ),
         uav_user=link(
             "UAV to ground user",
@@ -336,6 +357,7 @@ def build_problem(plan: Plan) -> Problem:
             relay.antennas,
             relay.power,
             user.noise,
-            radio.path_gains[1],
+            laws[1],
         ),
+        precoder=parts.get("precoder"),
     )

@@ -9,6 +9,7 @@ is the sine of the elevation. The paper's rho_0 d^-2 is n = 2 without elevation 
 antennas' patterns and the ground do over the elevation is in c_1 to c_3.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,8 +21,83 @@ PER_DB = float(np.log(10.0) / 10.0)
 """The natural logarithm of a gain of 1 dB."""
 
 
+_STEP = 1e-3
+"""Step of ln d² in central differences: second derivatives of logarithms err by some 1e-6."""
+
+_SAMPLES = 500
+"""Distances at which it is looked where a law turns that does not tell it. Chosen."""
+
+
+class GainFunction(ABC):
+    """A law of the path gain by distance and height: one's own is a subclass with `log`.
+
+    >>> class Free(GainFunction):
+    ...     def log(self, squared_distance, height):
+    ...         return np.log(1e-5 / squared_distance)
+    >>> float(Free().db(np.array(30.0), 40.0).round(2))
+    -83.98
+    """
+
+    @abstractmethod
+    def log(self, squared_distance: Real, height: float | Real) -> Real:
+        """Return l, the natural logarithm of the linear gain, (...), smooth.
+
+        At d² (...), m², the one antenna `height` m above the other.
+        """
+
+    @property
+    def square(self) -> bool:
+        """Whether this is the paper's rho_0 d^-2."""
+        return False
+
+    def gain(self, squared_distance: Real, height: float) -> Real:
+        """Return the linear gain at d² (...), m²."""
+        return np.asarray(np.exp(self.log(squared_distance, height)))
+
+    def db(self, distance: Real, height: float | Real) -> Real:
+        """Return the gain in dB at horizontal distances (...), m."""
+        return self.log(np.asarray(distance) ** 2 + height**2, height) / PER_DB
+
+    def slopes(self, away: Real, squared_distance: Real, height: float) -> tuple[Real, Real]:
+        """Return gradient (2, ...) and Hessian (3, ...) of l by place, at w - p = `away` (2, ...).
+
+        The Hessian's entries are xx, xy and yy. With t = ln d², both are those of t times l_t and
+        l_tt.
+        """
+        by_t, bent = self.by_log_distance(squared_distance, height)
+        t_i = 2 * away / squared_distance
+        hessian = (bent - by_t) * products(t_i, t_i)
+        hessian[[0, 2]] += by_t * (2 / squared_distance)
+        return by_t * t_i, hessian
+
+    def by_log_distance(self, squared_distance: Real, height: float) -> tuple[Real, Real]:
+        """Return l_t and l_tt (...) by t = ln d²: here by central differences."""
+        low, middle, high = (
+            self.log(squared_distance * np.exp(step), height) for step in (-_STEP, 0.0, _STEP)
+        )
+        return (high - low) / (2 * _STEP), (high - 2 * middle + low) / _STEP**2
+
+    def turns(self, farthest: float, height: float) -> Real:
+        """Return where l turns, as distances on the ground (k,) from 0 to `farthest`, m.
+
+        Between two of them l is monotone: the extreme gains up to `farthest` are at two of them.
+        """
+        distances = np.linspace(0.0, farthest, _SAMPLES)
+        rises = np.diff(self.log(distances**2 + height**2, height)) > 0
+        return distances[[0, *(1 + np.flatnonzero(np.diff(rises))), -1]]
+
+    def best_distance(self, farthest: float, height: float) -> float:
+        """Return the horizontal distance up to `farthest`, m, at which the gain is highest.
+
+        >>> PathGain(1e-5).best_distance(900.0, 100.0)
+        0.0
+        """
+        distances = self.turns(farthest, height)
+        return float(distances[np.argmax(self.log(distances**2 + height**2, height))])
+
+
 @dataclass(frozen=True)
-class PathGain:
+class PathGain(GainFunction):
     """A law of the path gain: rho_0 = `reference_gain` (linear, at 1 m), n, and c_1, c_2, ... (dB).
 
     >>> law = PathGain(1e-5, elevation_db=(6.0, -2.0))
@@ -48,28 +124,13 @@ class PathGain:
         beyond = self._beyond_square_law(squared_distance, height)
         return np.asarray(np.log(self.reference_gain / squared_distance) + beyond)
 
-    def db(self, distance: Real, height: float | Real) -> Real:
-        """Return the gain in dB at horizontal distances (...), m."""
-        return self.log(np.asarray(distance) ** 2 + height**2, height) / PER_DB
-
-    def slopes(self, away: Real, squared_distance: Real, height: float) -> tuple[Real, Real]:
-        """Return gradient (2, ...) and Hessian (3, ...) of l by place, at w - p = `away` (2, ...).
-
-        The Hessian's entries are xx, xy and yy. With t = ln d², both are those of t times l_t and
-        l_tt, where d s / d t = -s / 2.
-        """
+    def by_log_distance(self, squared_distance: Real, height: float) -> tuple[Real, Real]:
+        """Return l_t and l_tt (...) by t = ln d², where d s / d t = -s / 2."""
         s = height / np.sqrt(squared_distance)
-        by_t = -self.exponent / 2 + self._elevation(s, 1)
-        bent = self._elevation(s, 2)
-        t_i = 2 * away / squared_distance
-        hessian = (bent - by_t) * products(t_i, t_i)
-        hessian[[0, 2]] += by_t * (2 / squared_distance)
-        return by_t * t_i, hessian
+        return -self.exponent / 2 + self._elevation(s, 1), self._elevation(s, 2)
 
     def turns(self, farthest: float, height: float) -> Real:
         """Return where l turns, as distances on the ground (k,) from 0 to `farthest`, m.
-
-        Between two of them l is monotone: the extreme gains up to `farthest` are at two of them.
 
         >>> PathGain(1e-5).turns(900.0, 100.0).tolist()
         [0.0, 900.0]
@@ -84,15 +145,6 @@ class PathGain:
             s = s[(s / height > 0) & (np.abs(s) <= 1)]
             found = np.sqrt(np.maximum(0.0, (height / s) ** 2 - height**2))
         return np.array([0.0, *np.sort(found[found < farthest]), farthest])
-
-    def best_distance(self, farthest: float, height: float) -> float:
-        """Return the horizontal distance up to `farthest`, m, at which the gain is highest.
-
-        >>> PathGain(1e-5).best_distance(900.0, 100.0)
-        0.0
-        """
-        distances = self.turns(farthest, height)
-        return float(distances[np.argmax(self.log(distances**2 + height**2, height))])
 
     @cached_property
     def _terms(self) -> Real:

@@ -4,17 +4,48 @@ One stream is sent along the channel's best mode, and has the highest step whose
 reached. The optimiser sees steps that rise over some decibels; what is priced are the steps.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
 
 
+class StreamRate(ABC):
+    """The rate of one stream over its SNR: one's own is a subclass with `most` and `value`.
+
+    `most` is the highest rate, bit/s/Hz. `width`, dB, is over how much of the SNR it changes
+    noticeably, which the tables of the optimiser heed. Those with steps are `RateSteps`.
+    """
+
+    width: float = 4.0
+
+    @property
+    @abstractmethod
+    def most(self) -> float:
+        """The highest rate, bit/s/Hz."""
+
+    @abstractmethod
+    def value(self, snr: Real) -> Real:
+        """Return the rate at an SNR (...), linear, bit/s/Hz: smooth, and nowhere falling."""
+
+    def number(self, snr: Real) -> Integers:
+        """Return which step an SNR (...), linear, has: 1 is the lowest, 0 none."""
+        return np.zeros(np.shape(snr), dtype=np.int_)
+
+    def widened(self, width: float) -> Self:  # noqa: ARG002
+        """Return it as it is seen with steps that rise over `width` dB."""
+        return self
+
+    above = widened
+
+
 @dataclass(frozen=True)
-class RateSteps:
+class RateSteps(StreamRate):
     """From an SNR of `snr_db[k]` on, `rates[k]` bit/s/Hz, both rising.
 
     With a `width`, dB, each step rises over so much about its SNR, twice continuously

@@ -79,7 +79,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     rates, delivered, radio = solution.rates, solution.delivered_rate, plan.radio
     yield from _goal(solution)
     limit = result.saturation
-    limiting = "alphabet" if radio.rates is None else "radio's rates"
+    limiting = "alphabet" if solution.problem.uav_user.steps is None else "radio's rates"
     most = f", at most {limit.ceiling:.5g} by the {limiting}" if limit else ""
     measure = "" if plan.optimizer.rate == "cutoff" else " of mutual information"
     hops = f"base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f}"
@@ -119,7 +119,11 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
         most = f"at most {_told_rate(value, radio.bandwidth_mhz)} (estimate)"
         yield "bound", f"within {short:.2g} % of the best that any route can do: {most}"
     if limit is not None and limit.saturated:
-        told = "the alphabet is used up" if radio.rates is None else "the highest rate is had"
+        told = (
+            "the alphabet is used up"
+            if solution.problem.uav_user.steps is None
+            else "the highest rate is had"
+        )
         told += " and the route hardly matters: "
         yield "saturated", f"{told}{limit.spare_db:.1f} dB less power at both stations would do"
     if len(solution.starts) > 1:

@@ -112,7 +112,7 @@ def test_another_law_of_the_gain(small_plan: MakePlan, fading: str, precoder: st
     changes = {"radio.fading": fading, "optimizer.precoder": precoder, "radio.fading_samples": 4}
     plan = small_plan(changes | {"radio.gain": law, "radio.ground_user.gain": {"exponent": 2.2}})
     wanted, problem = design(plan), build_problem(plan)
-    assert [link.law.exponent for link in problem.links] == [2.6, 2.2]
+    assert [law.exponent for law in plan.radio.path_gains] == [2.6, 2.2]
     for link in problem.links:
         rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
 

@@ -42,7 +42,7 @@ def test_a_displaced_flight_is_priced_slot_by_slot(solution: Solution) -> None:
     for n in (0, 7, len(w) - 1):
         d2 = np.sum((w[n] - link.station) ** 2) + link.altitude**2
         H_r = link.small_scale(w)[..., n, :, :]
-        H = np.sqrt(link.law.reference_gain / d2) * H_r
+        H = np.sqrt(solution.plan.radio.reference_gain / d2) * H_r
         expected = cutoff_rate(H, solution.P_B[..., n, :, :], link.classes, link.noise)
         assert np.mean(expected) == pytest.approx(I_U[n])
     assert np.abs(I_U - solution.I_U).max() > 1e-4

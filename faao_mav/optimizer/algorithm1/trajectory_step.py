@@ -47,7 +47,8 @@ class SumOfExponentials:
 def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
     """Return the constraint of `link` for H_r (N + 2, N_r, N_t) and P (N + 2, N_t, N_t)."""
     slots, classes = len(H_r), link.classes
-    A = link.law.reference_gain * exponents(H_r, P, classes.vectors, link.noise)
+    rho_0 = link.law.gain(np.ones(1), link.altitude)
+    A = rho_0 * exponents(H_r, P, classes.vectors, link.noise)
     # O_B, O_U = 2 (N + 2) N_t log2 rho
     return SumOfExponentials(link, A, slots * (2 * classes.bits - classes.symbols))
 

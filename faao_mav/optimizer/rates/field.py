@@ -13,6 +13,7 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 from faao_mav.radio.gain import PER_DB
+from faao_mav.radio.rate_steps import RateSteps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +55,7 @@ def rate_field(problem: Problem, design: Design, width: float | None = None) -> 
     """
     kin = problem.kinematics
     links = problem.links
-    if (steps := problem.plan.radio.rate_steps) is not None:
+    if isinstance(steps := links[0].steps, RateSteps):
         steps = steps.widened(width or max(steps.gap, _LEAST_WIDTH))
         links = replace(links[0], steps=steps), replace(links[1], steps=steps)
     reach = kin.max_speed * kin.time_step * (kin.slots - 1)

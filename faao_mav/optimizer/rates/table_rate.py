@@ -146,7 +146,7 @@ def kind_of(link: Link, design: Design) -> Kind | None:
     """Return the kind of table that the rate of `link` under `design` has, if any."""
     if link.nlos is not None and not design.averaged:
         return "modes" if design.optimal and _few_modes(link) else None
-    rotated = design.optimal or (design.gaussian and design.scheme == "faao")
+    rotated = design.optimal or (design.gaussian and design.scheme == "faao" and not design.own)
     return "curve" if rotated or not link.follows_position else "surface"
 
 
