@@ -15,7 +15,8 @@ The public names, which are imported when they are first used:
   `render_parameters`, `Vehicle`, `predict`, `Track`, `check`, `Check`, `Finding`, `Limits`,
   `LinkCheck`
 - on the vehicle: `upload`, `download`, `fly_mission`, `Flight`, `read_log`, `debrief`
-- the radio: `PathGain`, `GainFunction`, `StreamRate`, `OwnParts`, `fit_link`, `LinkFit`, `Samples`, `read_measured`
+- the radio: `PathGain`, `GainFunction`, `StreamRate`, `OwnParts`, `fit_link`, `LinkFit`,
+  `Samples`, `read_measured`
 - many plans: `run_study`, `make_cases`, `parse_vary`, `StudyRow`, `as_array`
 - figures and pages: `flight_figure`, `route_figure`, `study_figure`, `save_figure`,
   `render_report`
