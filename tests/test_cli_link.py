@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.geodesy import LocalFrame
+from faao_mav.plan.yaml_text import load_yaml
 from faao_mav.validate.flown import FlightRecord
 
 STATION = (-35.36, 149.16, 5.0)
@@ -69,6 +70,11 @@ def test_logs_of_every_kind_give_the_law_that_was_flown(tmp_path: Path) -> None:
     law = out.read_text()
     assert f"reference_gain_db: {told['reference_gain_db']:.2f}\n" in law
     assert "a.bin, b.tlog, c.ulg" in law
+    angle, d = (load_yaml(law, "link.yaml")[key] for key in ("elevation_deg", "distance_m"))
+    assert angle == pytest.approx(told["elevation_deg"], abs=0.1)
+    assert d == pytest.approx(told["distance_m"], rel=1e-3)
+    assert 45 <= d[0] < 60  # the lowest flight passes the station 45 m above it
+    assert 60 < angle[1] <= 90
     text = page.read_text()
     assert text.count("<svg") == 3
     assert "<image" not in text

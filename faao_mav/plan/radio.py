@@ -3,7 +3,7 @@
 from dataclasses import field
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from faao_mav.plan.fields import (
     Antennas,
@@ -30,8 +30,16 @@ ChannelKnowledge: TypeAlias = Literal["statistical", "instantaneous"]
 Duplex: TypeAlias = Literal["full", "half"]
 
 _Rate: TypeAlias = Annotated[Number, Field(ge=0, le=1e6)]
+_Angle: TypeAlias = Annotated[Number, Field(ge=0, le=90)]
+_Distance: TypeAlias = Annotated[Number, Field(gt=0)]
 
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
+
+
+def _in_order(ends: tuple[float, float]) -> tuple[float, float]:
+    if ends[0] > ends[1]:
+        raise ValueError("the least is above the most")
+    return ends
 
 
 @section
@@ -53,6 +61,18 @@ class GainLaw:
     )
     correlation_m: Number = key(
         "Distance at which shadowing is correlated by 1/e.", "(0, 10000] m", default=50.0
+    )
+    elevation_deg: Annotated[tuple[_Angle, _Angle], AfterValidator(_in_order)] | None = key(
+        "Least and greatest elevation at which it was measured; null: unknown.",
+        "degrees",
+        "two numbers [least, most], 0 to 90",
+        default=None,
+    )
+    distance_m: Annotated[tuple[_Distance, _Distance], AfterValidator(_in_order)] | None = key(
+        "Least and greatest distance d at which it was measured; null: unknown.",
+        "m",
+        "two numbers [least, most] above 0",
+        default=None,
     )
     about: Text = key("What it was found from.", accepted="one line of text", default="")
 

@@ -82,6 +82,7 @@ def link_lines(fit: LinkFit, absolute: bool) -> Iterator[Line]:
 def link_record(fit: LinkFit, absolute: bool) -> dict[str, Any]:
     """Return the JSON object of `--json`; errors are null where one leg tells none."""
     error = [x if math.isfinite(x) else None for x in (*fit.errors, fit.error)]
+    d, angle = _seen(_places(fit))
     return {
         "reference_gain_db": fit.level if absolute else None,
         "exponent": fit.exponent,
@@ -91,6 +92,8 @@ def link_record(fit: LinkFit, absolute: bool) -> dict[str, Any]:
         "spread_db": fit.spread,
         "paper_spread_db": fit.paper_spread,
         "correlation_m": fit.correlation,
+        "elevation_deg": [float(angle.min()), float(angle.max())],
+        "distance_m": [float(d.min()), float(d.max())],
         "holds": fit.holds,
         "means": fit.count,
         "legs": fit.legs,
@@ -102,18 +105,29 @@ def link_yaml(fit: LinkFit, absolute: bool) -> str:
     """Return the file that a plan's `gain` names."""
     level = f"reference_gain_db: {fit.level:.2f}\n" if absolute else ""
     terms = ", ".join(f"{term:.2f}" for term in fit.elevation)
+    d, angle = _seen(_places(fit))
     return (
         f"# {law_text(fit)}: d the distance, m, s the sine of the elevation\n"
         f"about: {json.dumps(_ranges(fit))}\n"
         f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
         f"spread_db: {fit.spread:.2f}\ncorrelation_m: {fit.correlation:.0f}\n"
+        f"elevation_deg: [{angle.min():.1f}, {angle.max():.1f}]\n"
+        f"distance_m: [{d.min():.5g}, {d.max():.5g}]\n"
     )
 
 
-def _ranges(fit: LinkFit) -> str:
-    place = np.concatenate([flight.place for flight in fit.flights])
+def _places(fit: LinkFit) -> Real:
+    return np.concatenate([flight.place for flight in fit.flights])
+
+
+def _seen(place: Real) -> tuple[Real, Real]:
+    """Return the distances, m, and elevations, degrees, of places (k, 3) from the station."""
     d = np.linalg.norm(place, axis=1)
-    angle = np.degrees(np.arcsin(place[:, 2] / d))
+    return d, np.degrees(np.arcsin(place[:, 2] / d))
+
+
+def _ranges(fit: LinkFit) -> str:
+    d, angle = _seen(_places(fit))
     logs = ", ".join(dict.fromkeys(flight.source for flight in fit.flights))
     return (
         f"{d.min():.0f} to {d.max():.0f} m away, {angle.min():.0f} to {angle.max():.0f} degrees "
@@ -126,7 +140,7 @@ def link_page(fit: LinkFit, absolute: bool) -> str:
     from faao_mav.report.page import facts, figure_section, page, section
 
     every = -(-fit.count // _MOST_SHOWN)
-    place = np.concatenate([flight.place for flight in fit.flights])[::every]
+    place = _places(fit)[::every]
     level = np.concatenate([flight.level for flight in fit.flights])[::every]
     sections = [
         section("Link", facts(list(link_lines(fit, absolute))), "wide"),
@@ -154,9 +168,8 @@ def link_page(fit: LinkFit, absolute: bool) -> str:
 
 
 def _scatter(fit: LinkFit, place: Real, level: Real, over: str) -> "Figure":
-    d = np.linalg.norm(place, axis=1)
     distance = "distance" in over
-    x = d if distance else np.degrees(np.arcsin(place[:, 2] / d))
+    x = _seen(place)[0 if distance else 1]
     with drawing(WIDTH, 3.2) as figure:
         plot = figure.subplots()
         plot.plot(x, level, ".", color=SERIES[0], markersize=2.5, alpha=0.4, label="measured")

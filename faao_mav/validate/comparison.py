@@ -4,6 +4,8 @@ Of the mission only the predicted flight counts, so any mission can be compared:
 it was edited in a ground station, as it was downloaded.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from faao_mav.arrays import Real
@@ -29,6 +31,10 @@ _EVERY = 10
 _LEAST = 1e-6
 """The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
 
+_ANGLE, _FACTOR, _SHARE = 1.0, 1.05, 0.1
+"""Degrees and factor of distance by which a slot may be beyond what was measured, and the share of
+slots that may be farther beyond it. Chosen."""
+
 
 def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Prediction]:
     """Return what the flight `track` makes of the plan that `solution` solves.
@@ -53,9 +59,30 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         path_tolerance=plan.mission.path_tolerance,
         altitude_error=line.altitude_error(solution),
         worst=_worst(solution, flown),
+        unmeasured=tuple(_unmeasured(solution)),
         away=float(distances_to_path(line.w[::_EVERY], solution.w).min()),
     )
     return link, flown
+
+
+def _unmeasured(solution: Solution) -> Iterator[str]:
+    """Yield where more than `_SHARE` of the slots leave what the gain of a hop was measured at."""
+    radio, height = solution.plan.radio, solution.plan.flight.altitude
+    places = radio.base_station.position, radio.ground_user.position
+    names = "base station", "ground user"
+    for name, place, law in zip(names, places, radio.gain_laws, strict=True):
+        away = lengths(solution.w - place)
+        angle, d = np.degrees(np.arctan2(height, away)), np.hypot(away, height)
+        if law.elevation_deg is not None:
+            low, high = law.elevation_deg
+            if np.mean((angle < low - _ANGLE) | (angle > high + _ANGLE)) > _SHARE:
+                seen = f"the {name} sees the route {angle.min():.0f} to {angle.max():.0f} degrees"
+                yield f"{seen} high; the gain was measured from {low:.0f} to {high:.0f}"
+        if law.distance_m is not None:
+            near, far = law.distance_m
+            if np.mean((d < near / _FACTOR) | (d > far * _FACTOR)) > _SHARE:
+                seen = f"the route is {d.min():.0f} to {d.max():.0f} m from the {name}"
+                yield f"{seen}; the gain was measured from {near:.0f} to {far:.0f} m"
 
 
 def predicted_line(solution: Solution, track: Track | None) -> Line:

@@ -36,6 +36,8 @@ def _plan(context: ValidationContext) -> Hits:
         yield hit("link-nothing")
     for told, instead in doubtful_values(link.radio) if link and link.radio else ():
         yield hit("radio-values", told=told, instead=instead)
+    for told in link.unmeasured if link else ():
+        yield hit("link-unmeasured", told=told)
     if link is not None and link.elsewhere:
         yield hit("link-elsewhere", away=link.away / 1000)
 

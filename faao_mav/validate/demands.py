@@ -55,7 +55,8 @@ class LinkCheck:
     between planned and predicted path, `path_tolerance` m what the plan allows of it;
     `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
     None if none does; `bandwidth_mhz` is None where the plan has none. `radio` is what the plan
-    says of both links, `away` the least distance, m, between the two paths.
+    says of both links, `away` the least distance, m, between the two paths. `unmeasured` says
+    where the planned route leaves what the gain of a hop was measured at.
     """
 
     planned_rate: float
@@ -74,6 +75,7 @@ class LinkCheck:
     bandwidth_mhz: float | None = None
     radio: Radio | None = None
     away: float = 0.0
+    unmeasured: tuple[str, ...] = ()
 
     @property
     def elsewhere(self) -> bool:

@@ -55,7 +55,10 @@ fence:
 """
 )
 
-_LINK = b"reference_gain_db: -44.5\nelevation_db: [18, -30, 10]\nspread_db: 5.5\nabout: May\n"
+_LINK = (
+    b"reference_gain_db: -44.5\nelevation_db: [18, -30, 10]\nspread_db: 5.5\nabout: May\n"
+    b"elevation_deg: [2, 50]\n"
+)
 _RATES = b"# own\nmcs, snr_db, mbit_per_s\n0, 4, 6.5\n1, 7, 13\n2, 9.5, 19.5\n"
 
 _LARGEST_SEED = 5_000

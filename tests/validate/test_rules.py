@@ -4,14 +4,18 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from conftest import SMALL, edited
+from conftest import FLYABLE, SMALL, edited
 from judged import COPTER, LINK, VEHICLES, Given, check, flown, given
 
 from faao_mav.autopilot.body import CopterBody
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.plan import Radio, parse_plan
 from faao_mav.plan.radio_values import doubtful_values
 from faao_mav.validate import RULES, Level, Stretch, validate
+from faao_mav.workflow import Result, with_mission
 
 LIMITS = Path(__file__).parents[1] / "data" / "validate" / "limits.tsv"
 ROWS = [line.split("\t") for line in LIMITS.read_text().splitlines() if not line.startswith("#")]
@@ -23,7 +27,9 @@ def test_the_rule_speaks_and_is_silent(rule: str, item: str, trips: str, passes:
 
 
 def test_every_rule_is_tried_from_both_sides() -> None:
-    assert {row[0] for row in ROWS} | {"radio-values"} == {rule.id for rule in RULES}
+    assert {row[0] for row in ROWS} | {"radio-values", "link-unmeasured"} == {
+        rule.id for rule in RULES
+    }
 
 
 def radio(**changes: float) -> Radio:
@@ -53,6 +59,36 @@ def test_a_doubtful_value_names_the_likely_slip() -> None:
     assert list(told.values()) == ["did you mean -91?"]
     density = dict(doubtful_values(radio(**{"ground_user.noise_dbm": -174, "bandwidth_mhz": 20})))
     assert list(density.values()) == ["if it is a density (dBm/Hz), give -101.0 for the band"]
+
+
+def test_a_route_beyond_what_the_gain_was_measured_at_is_told() -> None:
+    """Two of the twenty slots may be beyond it by more than a degree or 5 %, a third is told."""
+    solution = optimize(parse_plan(FLYABLE))
+
+    def told(hop: str, **measured: list[float]) -> list[str]:
+        plan = parse_plan(edited(FLYABLE, {f"radio.{hop}": measured}))
+        flown = with_mission(Result(replace(solution, problem=build_problem(plan))))
+        found = [each for each in flown.findings if each.rule == "link-unmeasured"]
+        assert all(each.level is Level.WARNING for each in found)
+        return [each.message for each in found]
+
+    away = np.hypot(*(solution.w - np.array([60.0, 60.0])).T)
+    d = np.sort(np.hypot(away, 40.0)).tolist()
+    angle = np.sort(np.degrees(np.arctan2(40.0, away))).tolist()
+    hop, least = "ground_user.gain", 0.01
+    assert told(hop, elevation_deg=[0, angle[-3] - 1 + least]) == []
+    (text,) = told(hop, elevation_deg=[0, angle[-3] - 1 - least])
+    seen = f"the ground user sees the route {angle[0]:.0f} to {angle[-1]:.0f} degrees high"
+    assert text == f"{seen}; the gain was measured from 0 to {angle[-3] - 1 - least:.0f}"
+    assert told(hop, elevation_deg=[angle[2] + 1 - least, 90]) == []
+    assert len(told(hop, elevation_deg=[angle[2] + 1 + least, 90])) == 1
+    assert told(hop, distance_m=[1, d[-3] / 1.05 + least]) == []
+    (text,) = told(hop, distance_m=[1, d[-3] / 1.05 - least])
+    assert text.startswith(f"the route is {d[0]:.0f} to {d[-1]:.0f} m from the ground user; ")
+    assert told(hop, distance_m=[d[2] * 1.05 - least, 1e5]) == []
+    assert len(told(hop, distance_m=[d[2] * 1.05 + least, 1e5])) == 1
+    both = told("gain", elevation_deg=[0, 1], distance_m=[1e4, 1e5])
+    assert ["base station" in text for text in both] == [True, True, False, False]
 
 
 def test_the_airframe_decides_what_leaning_gives() -> None:
