@@ -173,6 +173,7 @@ class Result:
         """
         solution, plan, conversion = self.solution, self.solution.plan, self.conversion
         information, fresh, flown = self.information, self.fresh, self.prediction
+        under = self.shadowed
         return {
             "name": plan.name,
             **rates_as_dict(plan, solution.rates, solution.delivered_rate),
@@ -193,7 +194,9 @@ class Result:
             "upper_bound": self.bound.value if self.bound else None,
             "upper_bound_exact": self.bound.exact if self.bound else None,
             "goal": _goal_as_dict(solution),
-            "shadowing": asdict(self.shadowed) if self.shadowed else None,
+            "shadowing": {"mean": under.mean, "quantiles": dict(under.quantiles)}
+            if under
+            else None,
             "starts": dict(solution.starts),
             "iterations": solution.iterations,
             "converged": solution.converged,

@@ -79,7 +79,10 @@ def shadows(problem: Problem, w: Real, count: int = SHADOWINGS) -> Iterator[Real
 
 
 def outcomes(problem: Problem, w: Real, rates: Rates, count: int = SHADOWINGS) -> Real:
-    """Return what arrives under each of `count` of the `shadows` at w (n, 2), bit/s/Hz."""
+    """Return what has arrived after each slot under `count` of the `shadows` at w (n, 2).
+
+    Bits per slot and hertz (count, n), each the sum of what was before; see `arriving`.
+    """
     most = _REACH * max(law.spread_db or 0.0 for law in problem.plan.radio.gain_laws)
     table, now = np.array([rates(db) for db in np.linspace(-most, most, _OFFSETS)]), rates(0.0)
     shares = problem.relay.best_shares(now[0], now[1], problem.kinematics.time_step)
@@ -88,23 +91,32 @@ def outcomes(problem: Problem, w: Real, rates: Rates, count: int = SHADOWINGS) -
         place = np.clip((shadow / most + 1) / 2, 0, 1) * (_OFFSETS - 1)
         below = np.minimum(place.astype(np.intp), _OFFSETS - 2)
         low, high = table[below, hop, slot], table[below + 1, hop, slot]
-        found.append(_arrives(problem, low + (place - below) * (high - low), shares))
+        found.append(arriving(problem, low + (place - below) * (high - low), shares))
     return np.array(found)
 
 
-def _arrives(problem: Problem, rates: Real, shares: Real | None = None) -> float:
-    """Return what the plan maximises of `rates` (2, n), bit/s/Hz, with these or the best shares."""
+def arriving(problem: Problem, rates: Real, shares: Real | None = None) -> Real:
+    """Return what has arrived after each slot (n,) at `rates` (2, n), with given or best shares.
+
+    It is a sum, of which the last over n is what the plan maximises, bit/s/Hz: of what a relay
+    forwards or, for R_avg, what both hops have carried.
+    """
     if (queue := problem.maximised_queue) is None:
-        return float(rates.mean(axis=1).min())
-    return queue.relayed(rates[0], rates[1], problem.kinematics.time_step, shares).rate
+        return np.asarray(rates.cumsum(axis=1).min(axis=0))
+    relayed = queue.relayed(rates[0], rates[1], problem.kinematics.time_step, shares)
+    return relayed.forwarded.cumsum()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Shadowed:
-    """What arrives under shadowing, bit/s/Hz: the mean, and quantiles by their probability."""
+    """What arrives under shadowing, bit/s/Hz: the mean, and quantiles by their probability.
+
+    `arrived` are the same quantiles after each slot (n,), sums in bits per slot and hertz.
+    """
 
     mean: float
     quantiles: Mapping[float, float]
+    arrived: Mapping[float, Real]
 
 
 def shadowed(solution: Solution) -> Shadowed | None:
@@ -118,14 +130,16 @@ def shadowed(solution: Solution) -> Shadowed | None:
     )
     reliability = solution.plan.radio.reliability
     told = sorted({0.1, 0.5, 0.9} | ({round(1 - reliability, 9)} if reliability else set()))
-    quantiles = dict(zip(told, np.quantile(found, told).tolist(), strict=True))
-    return Shadowed(float(found.mean()), quantiles)
+    arrived = dict(zip(told, np.quantile(found, told, axis=0), strict=True))
+    n = len(solution.w)
+    quantiles = {part: float(sums[-1]) / n for part, sums in arrived.items()}
+    return Shadowed(float(found[:, -1].mean()) / n, quantiles, arrived)
 
 
 def worth(problem: Problem, w: Real, rates: Rates) -> float:
     """Return what the plan wants of the `outcomes`: their mean, or `radio.reliability`'s part."""
     reliability = problem.plan.radio.reliability
-    found = outcomes(problem, w, rates, _COMPARED)
+    found = outcomes(problem, w, rates, _COMPARED)[:, -1] / len(w)
     return float(found.mean() if reliability is None else np.quantile(found, 1 - reliability))
 
 
@@ -153,8 +167,9 @@ class Tolled:
 def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> Tolled:
     """Return `stage` with the toll of a flight at w (n, 2) for z standard deviations."""
     now, slopes = rates(0.0), rates(0.5) - rates(-0.5)
-    less = [_arrives(problem, now * np.array(part)) for part in ([[0.99], [1]], [[1], [0.99]])]
-    lost = np.maximum(_TINY, _arrives(problem, now) - np.array(less))
+    parts = ([[1], [1]], [[0.99], [1]], [[1], [0.99]])
+    most, *less = (arriving(problem, now * np.array(part))[-1] / len(w) for part in parts)
+    lost = np.maximum(_TINY, most - np.array(less))
     a = slopes * (lost / lost.sum())[:, None] / len(w)
     laws, every = problem.plan.radio.gain_laws, -(-len(w) // _PLACES)
     far = 2 * max(law.correlation_m for law in laws)

@@ -8,7 +8,9 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.autopilot import Track
+from faao_mav.optimizer.shadowing import Shadowed, arriving
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
 from faao_mav.report.maps import route_map
 from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.schedule.conversion import Conversion
@@ -97,15 +99,30 @@ def queue(
 
     Bits per hertz of bandwidth, or megabytes where the plan has a bandwidth.
     """
-    plan = solution.plan
-    megabytes, buffer = plan.radio.bandwidth_mhz, plan.radio.relay.buffer_mbytes
-    bits, unit = (1.0, "bit/Hz") if megabytes is None else (megabytes / 8, "megabytes")
-    held = plan.flight.time_step * bits  # of a bit/s/Hz for a slot
+    buffer = solution.plan.radio.relay.buffer_mbytes
+    held, unit = _of_a_slot(solution.plan)
     curves = {
         name: (solution.t, held * flight.relayed.queue)
         for name, flight in _flights(solution, prediction, flown).items()
     }
     return _figure(_Plot("", f"waiting, {unit}", curves, {"buffer": buffer} if buffer else {}))
+
+
+def arrival(solution: Solution, under: Shadowed) -> "Figure":
+    """Return what has arrived over time: planned, and under shadowing with a band of 0.1 to 0.9."""
+    held, unit = _of_a_slot(solution.plan)
+    t = solution.t + solution.plan.flight.time_step
+    planned = arriving(solution.problem, np.stack([solution.I_U, solution.I_G]), solution.shares)
+    with drawing(WIDTH, 2.6) as figure:
+        plot = figure.subplots()
+        plot.plot(t, held * planned, color=SERIES[0], label="planned")
+        low, half, high = (held * under.arrived[part] for part in (0.1, 0.5, 0.9))
+        plot.fill_between(t, low, high, color=SERIES[1], alpha=0.25, lw=0, label="8 of 10")
+        plot.plot(t, half, color=SERIES[1], label="median")
+        plot.set_ylim(bottom=0.0)
+        label(plot, "", "time, s", f"arrived, {unit}")
+        legend_above(plot)
+    return figure
 
 
 def precoder_power(solution: Solution) -> "Figure":
@@ -160,6 +177,12 @@ def energy(use: EnergyUse) -> "Figure":
         reserve = {"reserve": full - use.battery.usable}
         stored = _Plot("", "left, Wh", {"": (use.t, full - use.used)}, reserve)
     return _figure(_Plot("", "power, W", {"": (use.t, use.power)}), stored)
+
+
+def _of_a_slot(plan: Plan) -> tuple[float, str]:
+    """Return how much a bit/s/Hz is over a slot: bits per hertz, or megabytes with a bandwidth."""
+    megahertz, step = plan.radio.bandwidth_mhz, plan.flight.time_step
+    return (step, "bit/Hz") if megahertz is None else (step * megahertz / 8, "megabytes")
 
 
 def _flights(

@@ -129,6 +129,10 @@ def _figures(
     half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
     title = f"What the relay has received and not yet forwarded, over time{half}"
     yield "queue", "Queue", figures.queue(solution, prediction, flown), title
+    if (under := result.shadowed) is not None:
+        title = f"What has arrived over time, as {plan.radio.maximised} counts it: planned without "
+        title += "shadowing; with it the median, and in the band eight of ten, one above, one below"
+        yield "arrival", "What arrives", figures.arrival(solution, under), title
     first, last = solution.history[0], solution.history[-1]
     title = f"{plan.radio.maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz"
     yield "convergence", "Convergence", figures.convergence(solution), title

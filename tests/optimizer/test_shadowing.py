@@ -44,6 +44,9 @@ def test_the_smaller_of_two_normal_rates(small_plan: MakePlan) -> None:
     problem = build_problem(small_plan(SPREAD))
     w = np.zeros((problem.kinematics.slots, 2))
     found = outcomes(problem, w, lambda db: np.full((2, len(w)), 2 + db / 10), 3000)
+    assert found.shape == (3000, len(w))
+    np.testing.assert_allclose(found[:, 0] * len(w), found[:, -1])  # the same in all slots
+    found = found[:, -1] / len(w)
     assert found.mean() == pytest.approx(2 - 0.6 / np.sqrt(np.pi), abs=0.04)
     assert np.quantile(found, 0.5) == pytest.approx(2 - 0.6 * 0.5449, abs=0.05)
 
@@ -98,6 +101,10 @@ def test_a_plan_for_nine_of_ten_beats_that_for_the_mean_there_and_loses_in_the_m
         assert told.mean == pytest.approx(drawn.mean(), rel=0.05)
         assert told.quantiles[0.1] == pytest.approx(np.quantile(drawn, 0.1), rel=0.12)
         assert list(told.quantiles) == [0.1, 0.5, 0.9]
+        arrived = np.array(list(told.arrived.values()))
+        assert (np.diff(arrived) >= 0).all()
+        assert (np.diff(arrived, axis=0) >= 0).all()
+        np.testing.assert_allclose(arrived[:, -1] / len(solution.w), list(told.quantiles.values()))
         assert solution.is_feasible(1e-6)
         assert (solution.history <= solution.rates.R_avg).all()
 

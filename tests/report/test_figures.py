@@ -13,6 +13,8 @@ from reported import conversion, flown, prediction
 
 from faao_mav import optimize
 from faao_mav.errors import InputError
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.shadowing import shadowed
 from faao_mav.report import figures
 from faao_mav.report.style import save_figure
 
@@ -76,6 +78,25 @@ def test_the_curves_are_the_flight() -> None:
     to_uav, to_user = figures.rates(solution, prediction()).axes
     np.testing.assert_array_equal(lines(to_uav)["planned"].get_ydata(), solution.I_U)
     np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), prediction().I_G)
+
+
+@pytest.mark.parametrize(("causal", "bandwidth"), [(False, None), (True, 20.0)])
+def test_what_arrives_ends_at_what_the_summary_tells(causal: bool, bandwidth: float | None) -> None:
+    changes = {"causal": causal, "bandwidth_mhz": bandwidth, "gain.spread_db": 6.0}
+    plan = flown().solution.plan.changed({f"radio.{key}": each for key, each in changes.items()})
+    solution = replace(flown().solution, problem=build_problem(plan))
+    under = shadowed(solution)
+    assert under is not None
+    (axes,) = figures.arrival(solution, under).axes
+    whole = plan.flight.slots * plan.flight.time_step * (bandwidth / 8 if bandwidth else 1)
+    reached = solution.delivered_rate if causal else solution.rates.R_avg
+    ends = {name: line.get_ydata()[-1] / whole for name, line in lines(axes).items()}
+    assert ends == pytest.approx({"planned": reached, "median": under.quantiles[0.5]})
+    assert axes.get_ylabel() == ("arrived, megabytes" if bandwidth else "arrived, bit/Hz")
+    (band,) = axes.collections
+    last = np.asarray(band.get_paths()[0].vertices)
+    last = last[last[:, 0] == last[:, 0].max(), 1] / whole
+    assert (last.min(), last.max()) == pytest.approx((under.quantiles[0.1], under.quantiles[0.9]))
 
 
 def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen(small_plan: MakePlan) -> None:

@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.shadowing import shadowed
 from faao_mav.report import summary
 from faao_mav.report.page import render_report
 from faao_mav.validate.check import Check
@@ -84,6 +86,14 @@ def facts(page: str) -> dict[str, list[str]]:
         elif tag == "dd":
             found[label].append(text)
     return found
+
+
+def test_what_arrives_under_shadowing_has_a_band() -> None:
+    plan = flown().solution.plan.changed({"radio.gain.spread_db": 6.0})
+    solution = replace(flown().solution, problem=build_problem(plan))
+    page = Page(render_report(replace(flown(), solution=solution, shadowed=shadowed(solution))))
+    assert page.of("h2")[6:8] == ["Queue", "What arrives"]
+    assert {"planned", "8 of 10", "median"} <= set(page.of("text"))
 
 
 @pytest.mark.usefixtures("unpainted")
