@@ -86,7 +86,7 @@ def _answered(text: str, source: str, solve: Callable[[Plan], RoughFlight | Resu
         delivered=flight.delivered_rate,
         megabytes=flight.plan.megabytes(flight.delivered_rate),
         drawing=_drawing(flight, result),
-        charts=charts(flight),
+        charts=charts(flight, result.shadowed if result else None),
         velocities=flight.v,
         result=result,
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.rough import RoughFlight
+from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.energy import energy_use
 from faao_mav.vector import lengths
@@ -16,7 +17,7 @@ Chosen."""
 
 _GREY = "#888"
 _COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a", "#c9a227", "#4a9aa8")
-"""Of each curve, in the order of the plots."""
+"""Of each curve, in the order of the plots, over and over."""
 
 _MOST_DRAWN = 400
 """Points of a line on the map and of a chart; chosen: more cannot be told apart."""
@@ -28,16 +29,16 @@ def thinned(values: Real) -> Real:
     return np.asarray(values[kept])
 
 
-def charts(flight: RoughFlight | Solution) -> dict[str, Any]:
-    """Return the charts of `flight` over time, s."""
-    plots = _plots(flight)
+def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> dict[str, Any]:
+    """Return the charts of `flight` over time, s, with what arrives `under` shadowing."""
+    plots = _plots(flight, under)
     axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
             "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
     xs: list[dict[str, Any]] = []
     ys: list[dict[str, Any]] = []
     curves: list[dict[str, Any]] = []
     for k, (values, unit) in enumerate(plots):
-        colours = _COLOURS[len(curves) :]
+        colours = (2 * _COLOURS)[len(curves) :]
         title = ", ".join(f"{{c{n}|━}} {name}" for n, name in enumerate(values))
         marks = {f"c{n}": {"color": colours[n], "fontWeight": "bold"} for n in range(len(values))}
         xs.append({**axis, "gridIndex": k, "max": "dataMax"})
@@ -70,16 +71,22 @@ def heights(charts: dict[str, Any]) -> str:
     return f"--narrow: {plots * row}px; --wide: {-(-plots // 2) * row}px"
 
 
-def _plots(flight: RoughFlight | Solution) -> list[tuple[dict[str, Real], str]]:
+def _plots(
+    flight: RoughFlight | Solution, under: Shadowed | None
+) -> list[tuple[dict[str, Real], str]]:
     """Return the curves of each plot by name, and their unit."""
     plan, relayed = flight.plan, flight.relayed
     bandwidth, held, unit = plan.radio.bandwidth_mhz, plan.flight.time_step, "bit/Hz"
     if bandwidth is not None:
         held, unit = held * bandwidth / 8, "MB"
+    arrived = {"delivered": held * np.cumsum(relayed.forwarded)}
+    if under is not None and plan.radio.causal:
+        parts = {"more in 9 of 10": 0.1, "more in 1 of 10": 0.9}
+        arrived |= {name: held * under.arrived[part] for name, part in parts.items()}
     plots = [
         ({"base station to UAV": flight.I_U, "UAV to user": flight.I_G}, "bit/s/Hz"),
         ({"queue": held * relayed.queue}, unit),
-        ({"delivered": held * np.cumsum(relayed.forwarded)}, unit),
+        (arrived, unit),
         ({"speed": lengths(flight.v)}, "m/s"),
     ]
     velocity = np.pad(flight.v, ((0, 0), (0, 1)))

@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 import pytest
+from conftest import FLYABLE, edited
 
 from faao_mav.app import answers, planner
 from faao_mav.app.answers import Answer
@@ -124,3 +125,16 @@ def test_a_long_job_ends_with_its_wait_and_its_death_is_told() -> None:
 def test_answers_are_errors_where_a_plan_is_none() -> None:
     assert "site" in answers.rough("name: x\n", "p", None).refused
     assert "site" in answers.finished("name: x\n", "p").refused
+
+
+def test_with_a_spread_the_finished_chart_of_what_is_delivered_tells_what_arrives() -> None:
+    text = edited(FLYABLE, {"radio.causal": True, "radio.gain.spread_db": 6.0})
+    found = answers.finished(text, "p")
+    assert found.result is not None
+    assert found.result.shadowed is not None
+    ends = {each["name"]: each["data"][-1][1] for each in found.charts["baseOption"]["series"]}
+    quantiles = found.result.shadowed.quantiles
+    for name, rate in (("more in 9 of 10", quantiles[0.1]), ("more in 1 of 10", quantiles[0.9])):
+        assert ends[name] == pytest.approx(10 * rate, abs=1e-3)
+    rough = answers.rough(text, "p", None).charts["baseOption"]["series"]
+    assert [each["name"] for each in rough] == [name for name in ends if "of 10" not in name]
