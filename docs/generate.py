@@ -3,6 +3,7 @@
 A page holds lines `<!-- generated: WHAT -->`; the hook replaces them by Markdown. WHAT is
 
 - `file NAME`: a file beside this folder, as README.md, with links as seen from here;
+- `code NAME`: a script below this folder, as a block of code;
 - `plan`: the keys of plan.yaml, one table per section, from the schema;
 - `command NAME`: usage and options of a command, from its `--help`;
 - `rules`: the rules of `faao-mission validate --rules`;
@@ -23,7 +24,7 @@ from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.validate import RULES
 
 _DOCS = Path(__file__).parent
-_MARK = re.compile(r"^<!-- generated: (\w+) ?([\w.]*) -->$", re.MULTILINE)
+_MARK = re.compile(r"^<!-- generated: (\w+) ?([\w./]*) -->$", re.MULTILINE)
 _OPTION = re.compile(r"^  (-.*?)(?:  +|\n +)((?:.|\n   )*)$", re.MULTILINE)
 """An option and what it is for, on the same or on the next lines of a `--help`."""
 _EXAMPLE = re.compile(r"^>>> .*(?:\n(?!\n).*)*", re.MULTILINE)
@@ -40,6 +41,11 @@ def file(name: str) -> str:
     text = (_DOCS.parent / name).read_text(encoding="utf-8")
     text = re.sub(r"\]\(docs/", "](", text)
     return re.sub(r"\]\(([A-Z]+)\.md\)", lambda link: f"]({link[1].lower()}.md)", text)
+
+
+def code(name: str) -> str:
+    """Return a script below docs/ as a block of code."""
+    return f"```python\n{(_DOCS / name).read_text(encoding='utf-8')}```"
 
 
 def plan() -> str:
@@ -106,6 +112,7 @@ class Examples(griffe.Extension):
 
 _WRITERS: dict[str, Callable[..., str]] = {
     "file": file,
+    "code": code,
     "plan": plan,
     "command": command,
     "rules": rules,
