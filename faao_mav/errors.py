@@ -23,7 +23,15 @@ class InputError(FaaoError):
 
 
 class PlanError(InputError):
-    """A plan cannot be read or asks for something impossible."""
+    """A plan cannot be read or asks for something impossible.
+
+    >>> from faao_mav import read_plan
+    >>> plan = read_plan("missions/copter_relay.yaml")
+    >>> plan.changed({"flight.duration": "long"})  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.PlanError: missions/copter_relay.yaml: flight.duration: 'long' is not ...
+    """
 
 
 class MissionFileError(InputError):

@@ -88,6 +88,11 @@ class Mission:
     A fence and rally points travel beside it: only some formats hold them. `unread` has those of
     `BESIDE` that a vehicle may hold, but that could not be read from it. Raises `InputError` for
     more items or rally points than any autopilot keeps.
+
+    >>> from faao_mav.mission.command import Command, Frame
+    >>> there = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=47.4, y=8.5, z=50.0)
+    >>> Mission((there,), Home(47.39, 8.5, 440.0))
+    <Mission: 1 items, 0 zones, 0 rally points>
     """
 
     items: tuple[MissionItem, ...]

@@ -14,6 +14,11 @@ def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[Own
     `observe` is told the progress; `parts` are one's own, see `OwnParts`. Raises `PlanError` when
     the plan asks for more than the method can handle, `InfeasibleError` when no flight satisfies
     it, `InputError` for parts with a goal or Algorithm 1.
+
+    >>> from faao_mav import read_plan
+    >>> solution = optimize(read_plan("missions/copter_relay.yaml"))
+    >>> solution.converged, solution.w.shape, solution.P_B.shape
+    (True, (240, 2), (240, 2, 2))
     """
     if parts and (plan.goal.minimise or plan.goal.maximise == "data"):
         raise InputError(f"{', '.join(parts)}: a plan with a goal takes no parts of one's own")

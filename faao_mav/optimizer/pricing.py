@@ -73,6 +73,11 @@ def price(solution: Solution) -> MutualInformation:
 
     The noises are fixed: the same plan gives the same value. Raises `InputError` for a plan whose
     `radio.rates` take the place of the alphabet.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> solution = optimize(read_plan("missions/copter_relay.yaml"))
+    >>> price(solution).average > solution.rates.R_avg  # the cutoff rate bounds it from below
+    True
     """
     if solution.problem.uav_user.steps is not None:
         raise InputError("radio.rates: rates of the radio's own have no mutual information")
@@ -205,7 +210,13 @@ class Saturation:
 
 
 def saturation(solution: Solution) -> Saturation:
-    """Return how far into saturation `solution` is, with its own route, precoders and shares."""
+    """Return how far into saturation `solution` is, with its own route, precoders and shares.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> plan = read_plan("missions/paper_active.yaml").changed({"optimizer.method": "direct"})
+    >>> saturation(optimize(plan)).saturated
+    False
+    """
     problem = solution.problem
     full = [np.full(len(solution.w), link.most) for link in problem.links]
 

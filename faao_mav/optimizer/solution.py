@@ -302,6 +302,15 @@ def save_solution(
     `converged`, `ending`, `starts` (JSON text), `gain` if there is one and `plan`, the YAML text;
     and the arrays `extra`,
     which `load_solution` leaves alone. The same solution gives the same bytes.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> from faao_mav import load_solution, optimize, read_plan
+    >>> solution = optimize(read_plan("missions/copter_relay.yaml"))
+    >>> with TemporaryDirectory() as folder:
+    ...     save_solution(solution, Path(folder) / "flight.npz")
+    ...     loaded = load_solution(Path(folder) / "flight.npz")
+    >>> bool(np.all(loaded.w == solution.w))
+    True
     """
     rates = solution.rates
     values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}

@@ -144,6 +144,13 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     several heights were flown, each height. More parameters have to pay. Least squares are robust
     (Huber). Raises `InputError` where there are fewer than ten means in flight, or all at one
     place.
+
+    >>> t = np.arange(0.0, 200.0)
+    >>> place = np.stack([300.0 * np.cos(t / 9), 8.0 * t - 700.0, 40.0 + 0.2 * t], axis=1)
+    >>> level = -40.0 - 20.0 * np.log10(np.linalg.norm(place, axis=1))
+    >>> fit = fit_link([Samples(t, place, level)], seconds=1.0)
+    >>> round(fit.level, 6), fit.exponent, fit.holds
+    (-40.0, 2.0, True)
     """
     means = tuple(flight.means(seconds) for flight in flights)
     place = np.concatenate([each.place for each in means])

@@ -84,12 +84,21 @@ def read_measured(
     units: Mapping[str, str] = _NONE,
     calibration: Calibration = (),
 ) -> Measured:
-    """Return the flight in the table `path`: time, latitude, longitude, altitude and one level.
+    r"""Return the flight in the table `path`: time, latitude, longitude, altitude and one level.
 
     Levels are rsrp, rssi, snr or throughput. `station` is latitude and longitude, degrees, and
     height, m, of the antenna of the station, above what the altitudes are above. `units` are those
     of columns whose header does not tell them; `calibration` is a device's. Rows without a number
     are left out. Raises `InputError` for anything else.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     table = Path(folder) / "flight.csv"
+    ...     text = "time_s,lat,lon,alt_m,rssi_dbm\n0,47.001,8.0,60,-70\n"
+    ...     _ = table.write_text(text)
+    ...     found = read_measured(table, (47.0, 8.0, 10.0))
+    >>> found.unit, found.samples.place.round().tolist(), found.samples.level.tolist()
+    ('dbm', [[0.0, 111.0, 50.0]], [-70.0])
     """
     path = Path(path)
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)

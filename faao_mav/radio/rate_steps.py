@@ -20,6 +20,13 @@ class StreamRate(ABC):
 
     `most` is the highest rate, bit/s/Hz. `width`, dB, is over how much of the SNR it changes
     noticeably, which the tables of the optimiser heed. Those with steps are `RateSteps`.
+
+    >>> class Half(StreamRate):
+    ...     most = 4.0
+    ...     def value(self, snr):
+    ...         return np.minimum(0.5 * np.log2(1.0 + snr), self.most)
+    >>> Half().value(np.array([3.0, 15.0])).tolist()
+    [1.0, 2.0]
     """
 
     width: float = 4.0

@@ -57,7 +57,12 @@ def flight_figure(
 def route_figure(
     solution: Solution, conversion: Conversion | None = None, flown: Prediction | None = None
 ) -> "Figure":
-    """Return the map of the route: see `route_map`."""
+    """Return the map of the route: see `route_map`.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> route_figure(optimize(read_plan("missions/copter_relay.yaml"))).axes[0].get_xlabel()
+    'east, m'
+    """
     with drawing(WIDTH, 4.2) as figure:
         route_map(solution, conversion, figure.subplots(), flown=flown)
     return figure

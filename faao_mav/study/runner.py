@@ -67,6 +67,13 @@ def run_study(
     it is done, rows that are there already are not run again, and the table is written at the end.
     `observe` is told each row, old ones first. Raises `InputError` for a directory or a cluster of
     no use.
+
+    >>> from faao_mav import as_array, make_cases, read_plan
+    >>> plan = read_plan("missions/copter_relay.yaml")
+    >>> cases = make_cases(plan.text, vary={"flight.altitude": [60, 120], "flight.time_step": [2]})
+    >>> rows = as_array(run_study(cases, jobs=1))
+    >>> rows["flight.altitude"].tolist(), bool(rows["delivered"][0] > rows["delivered"][1])
+    ([60, 120], True)
     """
     with nullcontext() if cluster is None else _connected(cluster):
         old = _prepare(directory, cases) if directory is not None else ()

@@ -41,6 +41,11 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
 
     That is the delivered rate, or with `radio.causal: false` R_avg. `known` is that rate of any
     plan for it, bit/s/Hz: the better it is, the tighter the bound. `observe` is told the progress.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> solution = optimize(read_plan("missions/copter_relay.yaml"))
+    >>> 1.0 < upper_bound(solution.problem).value / solution.delivered_rate < 1.1
+    True
     """
 
     def tell(number: int, stage: str, best: float) -> None:
