@@ -106,6 +106,7 @@ def test_where_no_law_holds_nothing_is_written(tmp_path: Path) -> None:
         (["--station", PLACE, "--calibrate", "3=x"], "--calibrate 3=x: expected COUNT=DBM"),
         (["--station", PLACE, "--calibrate", "3=4", "--calibrate", "3=5"], "two different counts"),
         (["--station", PLACE, "--out", "x.txt"], "x.txt"),
+        (["--station", PLACE, "--unit", "rsi=dbm"], "--unit rsi: no such column; give one of time"),
         (["--station", PLACE, "--unit", "rssi=watt"], "'watt'; name it in the header"),
     ],
 )

@@ -121,6 +121,23 @@ class LinkFit:
         return f"<LinkFit: {law}, spread {self.spread:.1f} dB of {self.count} means>"
 
     @property
+    def place(self) -> Real:
+        """Where the means were flown, (k, 3), m east, north and up of the antenna."""
+        return np.concatenate([flight.place for flight in self.flights])
+
+    @property
+    def distance_m(self) -> tuple[float, float]:
+        """The least and the greatest distance of the means, m."""
+        d, _ = seen(self.place)
+        return float(d.min()), float(d.max())
+
+    @property
+    def elevation_deg(self) -> tuple[float, float]:
+        """The least and the greatest elevation at which the antenna saw them, degrees."""
+        _, angle = seen(self.place)
+        return float(angle.min()), float(angle.max())
+
+    @property
     def holds(self) -> bool:
         """Whether a law of place says anything: what is left is not beyond `SPREAD_OF_NO_LAW`."""
         return self.spread <= SPREAD_OF_NO_LAW
@@ -134,6 +151,12 @@ class LinkFit:
         """Return the fitted level, dB, at `place` (..., 3), m from the station's antenna."""
         law = PathGain(10.0 ** (self.level / 10.0), self.exponent, self.elevation)
         return law.db(lengths(place[..., :2]), place[..., 2])
+
+
+def seen(place: Real) -> tuple[Real, Real]:
+    """Return distances, m, and elevations, degrees, of `place` (k, 3), m from the antenna."""
+    d = np.linalg.norm(place, axis=1)
+    return d, np.degrees(np.arcsin(place[:, 2] / d))
 
 
 def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
@@ -168,13 +191,14 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
         A, y = _linear(place, level, *law)
         return [_rms(_left_out(A, y, part)) for part in parts]
 
-    best, spread = _PAPER, errors(_PAPER)
+    best, paper = _PAPER, errors(_PAPER)
+    spread = paper
     for law in sorted(product((False, True), range(TERMS + 1)), key=lambda law: sum(law)):
         if parts and law != _PAPER and not _wild(*_linear(place, level, *law), law):
             tried = errors(law)
             if np.mean(tried) < (1.0 - _PAYS) * np.mean(spread):
                 best, spread = law, tried
-    return _with_errors(means, best, legs, spread, errors(_PAPER), int(heights.max()) + 1)
+    return _with_errors(means, best, legs, spread, paper, int(heights.max()) + 1)
 
 
 def _with_errors(

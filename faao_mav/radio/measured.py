@@ -57,7 +57,8 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
 any other device's count."""
 
 SIK_STEP, _SIK_AT_ZERO = 1.0 / 1.9, -127.0
-"""dB a count of a SiK radio, and dBm that it counts as 0 (SiK firmware; MAVLink, RADIO_STATUS)."""
+"""dB a count of a SiK radio, and dBm that it counts as 0 (ArduPilot, "SiK Radio: Advanced
+Configuration", which calls it approximate)."""
 
 Calibration: TypeAlias = Sequence[Sequence[float]]
 """Counts of a device, and the dBm that they are: one or two."""
@@ -101,6 +102,9 @@ def read_measured(
     ('dbm', [[0.0, 111.0, 50.0]], [-70.0])
     """
     path = Path(path)
+    if unknown := units.keys() - _WORDS.keys():
+        text = f"--unit {min(unknown)}: no such column; give one of {', '.join(_WORDS)}"
+        raise InputError(text)
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
     header = next(lines, "")

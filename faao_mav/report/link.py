@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit
+from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, seen
 from faao_mav.report.style import INK, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.report.summary import Line
 from faao_mav.validate.words import counted
@@ -53,36 +53,28 @@ def link_lines(fit: LinkFit, absolute: bool) -> Iterator[Line]:
             "",
             "shape only: the plan's radio.reference_gain_db stands; give --power for the level",
         )
-    yield "measured", _ranges(fit)
+    (near, far), (least, most) = fit.distance_m, fit.elevation_deg
+    ranges = f"{near:.0f} to {far:.0f} m away, {least:.0f} to {most:.0f} degrees high"
+    yield "measured", f"{ranges}; {_rests_on(fit)}"
     left_out = counted(fit.legs, "leg")
     if fit.heights > 1:
         left_out += f" and {fit.heights} heights"
     if fit.legs == 1:
         yield "", "one leg alone: d^-2 with its level, nothing that could be told from it"
     else:
-        yield (
-            "spread",
-            (
-                f"{fit.spread:.1f} dB at {left_out} left out one by one (d^-2: "
-                f"{fit.paper_spread:.1f}), correlated over {fit.correlation:.0f} m"
-            ),
-        )
+        told = f"{fit.spread:.1f} dB at {left_out} left out one by one (d^-2: "
+        told += f"{fit.paper_spread:.1f}), correlated over {fit.correlation:.0f} m"
+        yield "spread", told
         yield "error", f"{fit.error:.1f} dB of the gain where it was flown, one standard error"
     if not fit.holds:
-        yield (
-            "no law",
-            (
-                f"of distance and elevation holds: {fit.spread:.1f} dB are left, more than "
-                f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
-                "stands about it, or fly higher"
-            ),
-        )
+        told = f"of distance and elevation holds: {fit.spread:.1f} dB are left, more than "
+        told += f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
+        yield "no law", f"{told}stands about it, or fly higher"
 
 
 def link_record(fit: LinkFit, absolute: bool) -> dict[str, Any]:
     """Return the JSON object of `--json`; errors are null where one leg tells none."""
     error = [x if math.isfinite(x) else None for x in (*fit.errors, fit.error)]
-    d, angle = _seen(_places(fit))
     return {
         "reference_gain_db": fit.level if absolute else None,
         "exponent": fit.exponent,
@@ -92,8 +84,8 @@ def link_record(fit: LinkFit, absolute: bool) -> dict[str, Any]:
         "spread_db": fit.spread,
         "paper_spread_db": fit.paper_spread,
         "correlation_m": fit.correlation,
-        "elevation_deg": [float(angle.min()), float(angle.max())],
-        "distance_m": [float(d.min()), float(d.max())],
+        "elevation_deg": fit.elevation_deg,
+        "distance_m": fit.distance_m,
         "holds": fit.holds,
         "means": fit.count,
         "legs": fit.legs,
@@ -105,34 +97,20 @@ def link_yaml(fit: LinkFit, absolute: bool) -> str:
     """Return the file that a plan's `gain` names."""
     level = f"reference_gain_db: {fit.level:.2f}\n" if absolute else ""
     terms = ", ".join(f"{term:.2f}" for term in fit.elevation)
-    d, angle = _seen(_places(fit))
+    least, most = fit.elevation_deg
+    near, far = fit.distance_m
     return (
         f"# {law_text(fit)}: d the distance, m, s the sine of the elevation\n"
-        f"about: {json.dumps(_ranges(fit))}\n"
+        f"about: {json.dumps(_rests_on(fit))}\n"
         f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
         f"spread_db: {fit.spread:.2f}\ncorrelation_m: {fit.correlation:.0f}\n"
-        f"elevation_deg: [{angle.min():.1f}, {angle.max():.1f}]\n"
-        f"distance_m: [{d.min():.5g}, {d.max():.5g}]\n"
+        f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
     )
 
 
-def _places(fit: LinkFit) -> Real:
-    return np.concatenate([flight.place for flight in fit.flights])
-
-
-def _seen(place: Real) -> tuple[Real, Real]:
-    """Return the distances, m, and elevations, degrees, of places (k, 3) from the station."""
-    d = np.linalg.norm(place, axis=1)
-    return d, np.degrees(np.arcsin(place[:, 2] / d))
-
-
-def _ranges(fit: LinkFit) -> str:
-    d, angle = _seen(_places(fit))
+def _rests_on(fit: LinkFit) -> str:
     logs = ", ".join(dict.fromkeys(flight.source for flight in fit.flights))
-    return (
-        f"{d.min():.0f} to {d.max():.0f} m away, {angle.min():.0f} to {angle.max():.0f} degrees "
-        f"high; {counted(fit.count, 'mean')} of {logs}"
-    )
+    return f"{counted(fit.count, 'mean')} of {logs}"
 
 
 def link_page(fit: LinkFit, absolute: bool) -> str:
@@ -140,7 +118,7 @@ def link_page(fit: LinkFit, absolute: bool) -> str:
     from faao_mav.report.page import facts, figure_section, page, section
 
     every = -(-fit.count // _MOST_SHOWN)
-    place = _places(fit)[::every]
+    place = fit.place[::every]
     level = np.concatenate([flight.level for flight in fit.flights])[::every]
     sections = [
         section("Link", facts(list(link_lines(fit, absolute))), "wide"),
@@ -169,7 +147,7 @@ def link_page(fit: LinkFit, absolute: bool) -> str:
 
 def _scatter(fit: LinkFit, place: Real, level: Real, over: str) -> "Figure":
     distance = "distance" in over
-    x = _seen(place)[0 if distance else 1]
+    x = seen(place)[0 if distance else 1]
     with drawing(WIDTH, 3.2) as figure:
         plot = figure.subplots()
         plot.plot(x, level, ".", color=SERIES[0], markersize=2.5, alpha=0.4, label="measured")
