@@ -8,7 +8,9 @@ from faao_mav.autopilot import AutopilotFamily
 from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.dialect import BESIDE
 from faao_mav.autopilot.px4 import PX4, px4_mode
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, RALLY_POINT, Frame
+from faao_mav.autopilot.px4.dialect import CONDITIONS, FLIES, LEAST_TAKEOFF
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, RALLY_POINT, Command, Frame
+from faao_mav.mission.item import Mission
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.wire_items import GLOBAL_FRAMES
@@ -41,6 +43,7 @@ class Behaviour:
         silent_at_boot: it answers nothing about lists before it is ready.
         tells_no_place: it tells latitude and longitude 0 as long as it knows none; else nothing.
         armed_inside_only: it does not arm where home lies outside the fence.
+        infeasible: why a mission is not flown though it was taken, "" if it is.
         refusals: results to answer an item (or `COUNT`) of a list with, whatever it says.
     """
 
@@ -57,6 +60,7 @@ class Behaviour:
     silent_at_boot: bool = False
     tells_no_place: bool = False
     armed_inside_only: bool = False
+    infeasible: Callable[[Mission], str] = lambda _: ""
     refusals: Mapping[tuple[int, int], MavResult] = field(default_factory=dict)
 
 
@@ -89,6 +93,19 @@ def _px4_answer(part: MissionType, item: WireItem) -> MavResult:
     return MavResult.ERROR if thin else MavResult.ACCEPTED
 
 
+def _px4_infeasible(mission: Mission) -> str:
+    """Return why PX4, which says so in an event only, refuses to start `mission`."""
+    flying = [item.command for item in mission.items if item.command in FLIES]
+    takeoffs = [item for item in mission.items if item.command == Command.NAV_TAKEOFF]
+    if any(item.command in CONDITIONS for item in mission.items):
+        return "unsupported command"
+    if any(item.z < LEAST_TAKEOFF for item in takeoffs):
+        return "take-off altitude too low"
+    if len(takeoffs) > 1 or (takeoffs and flying[0] != Command.NAV_TAKEOFF):
+        return "take-off is not the first position"
+    return "starts with landing" if flying[:1] == [Command.NAV_LAND] else ""
+
+
 _ARDUPILOT = Behaviour(
     family=ARDUPILOT,
     mission_limit=655,  # as in its simulator
@@ -113,6 +130,7 @@ _PX4 = Behaviour(
     returns_by_mode=frozenset({"copter", "plane"}),
     numbers_lists=True,
     silent_at_boot=True,
+    infeasible=_px4_infeasible,
 )
 
 _BEHAVIOURS: dict[MockKind, Behaviour] = {

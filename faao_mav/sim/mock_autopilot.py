@@ -355,9 +355,10 @@ class MockAutopilot(Machine[None]):
     def _problem(self) -> str:
         """Return why what is stored cannot be flown, "" if it can."""
         try:
-            return "" if self.mission().items else "no mission"
+            mission = self.mission()
         except InputError as error:  # peers store what they like
             return str(error)
+        return self.behaviour.infeasible(mission) if mission.items else "no mission"
 
     def _begin(self, now: float) -> int:
         """Fly the mission, once armed and told to; not a second time."""

@@ -5,19 +5,11 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from faao_mav.autopilot.dialect import name_of
+from faao_mav.autopilot.px4.dialect import CONDITIONS, FLIES, LEAST_TAKEOFF
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero
 from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.validate.straight import HOME, Straight
-
-_CONDITIONS = (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
-
-_SINGLE = 1e-3
-"""The least height above home, m, that is above 0 to PX4: it adds home's height above the sea, in
-single precision. A billionth was refused."""
-
-_FLIES = FLOWN_TO | {Command.NAV_RETURN_TO_LAUNCH, 187, 211, 4501, 42600}
-"""What checkTakeoff counts as flying: actuators, grippers, winches and gates as well."""
 
 _SPARE_ANGLE = 0.1
 """How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own."""
@@ -39,7 +31,7 @@ _STRAIGHT = math.radians(5)
 def _items(context: ValidationContext) -> Hits:
     """Items by themselves."""
     for k, item in enumerate(context.items):
-        if item.command in _CONDITIONS and item.frame == Frame.MISSION:
+        if item.command in CONDITIONS and item.frame == Frame.MISSION:
             yield hit("px4-command-rejected", k)
         if item.command in (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000):
             yield hit("px4-vtol-items", k)
@@ -86,7 +78,7 @@ def _whole(context: ValidationContext) -> Hits:
 def _takeoff(context: ValidationContext) -> Hits:
     """Where the take-off stands, where it leads, and whether there has to be one."""
     takeoffs = [k for k, _ in context.each(*TAKEOFFS)]
-    before = next((k for k, item in enumerate(context.items) if item.command in _FLIES), 0)
+    before = next((k for k, item in enumerate(context.items) if item.command in FLIES), 0)
     which, instead = "the take-off comes", f"move it before item {before + 1}"
     if before in takeoffs:
         which, instead = "a second take-off,", "remove it"
@@ -99,7 +91,7 @@ def _takeoff(context: ValidationContext) -> Hits:
     least = max(radius + 1, first)
     for place in context.places_of(TAKEOFFS):
         away = context.home is not None and place.from_origin > radius
-        if place.up < _SINGLE:
+        if place.up < LEAST_TAKEOFF:
             yield hit("px4-takeoff-altitude", place.index, place=place)
         if 0 < place.up < least:
             yield hit("px4-takeoff-low", place.index, place=place, least=least, **told)

@@ -19,6 +19,7 @@ from faao_mav.errors import MissionFileError
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.sim import behaviour_of
 from faao_mav.validate import Finding, Level, ValidationContext, validate
 from faao_mav.validate.check import check
 
@@ -95,7 +96,7 @@ MILDER = {
 """Missions that were not flown as they are written, with less than is asked here, and why."""
 
 
-def findings(name: str) -> tuple[Finding, ...]:
+def recorded_mission(name: str) -> Mission:
     recorded = RECORDED[name]
     items = []
     for times, its, frame, *values, autocontinue in recorded["items"]:
@@ -103,8 +104,12 @@ def findings(name: str) -> tuple[Finding, ...]:
         items += [MissionItem(its, frame, (p1, p2, p3, p4), x, y, z, bool(autocontinue))] * times
     corners = tuple((latitude, longitude) for latitude, longitude in recorded.get("fence", ()))
     fence = Fence((Polygon(corners, inclusion=True),)) if corners else Fence()
-    vehicle = Vehicle(*VEHICLES[name.split("/")[0]], recorded["parameters"])
-    return validate(ValidationContext(Mission(tuple(items), HOME, fence), vehicle))
+    return Mission(tuple(items), HOME, fence)
+
+
+def findings(name: str) -> tuple[Finding, ...]:
+    vehicle = Vehicle(*VEHICLES[name.split("/")[0]], RECORDED[name]["parameters"])
+    return validate(ValidationContext(recorded_mission(name), vehicle))
 
 
 @pytest.mark.parametrize("name", RECORDED)
@@ -128,3 +133,20 @@ def test_there_are_verdicts_of_all_kinds_and_all_vehicles() -> None:
     kinds = {mission["verdict"] for mission in RECORDED.values()}
     assert kinds == NOT_FLOWN | CUT_SHORT | {"flown"}
     assert set(STRICTER) | set(MILDER) <= set(RECORDED)
+
+
+STRUCTURE = ("takeoff is not the first", "altitude too low", "starts with landing", "unsupported")
+"""What PX4 says of the missions that it takes, and does not start for their items alone."""
+
+
+def test_the_mock_of_px4_starts_what_px4_started() -> None:
+    infeasible, refused = behaviour_of("px4").infeasible, 0
+    for name, recorded in RECORDED.items():
+        if name.startswith("px4/"):
+            said = " ".join(recorded.get("said", ()))
+            if recorded["verdict"] == "flown":
+                assert infeasible(recorded_mission(name)) == "", name
+            elif recorded["verdict"] == "rejected" and any(each in said for each in STRUCTURE):
+                assert infeasible(recorded_mission(name)) != "", name
+                refused += 1
+    assert refused >= 10

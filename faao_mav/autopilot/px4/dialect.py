@@ -14,8 +14,18 @@ from faao_mav.autopilot.dialect import (
     single,
     whole,
 )
-from faao_mav.mission.command import Command, Frame
+from faao_mav.mission.command import FLOWN_TO, Command, Frame
 from faao_mav.mission.item import MissionItem
+
+CONDITIONS = (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
+"""Commands that it takes, and starts no mission with."""
+
+LEAST_TAKEOFF = 1e-3
+"""The least height above home, m, that is above 0 to PX4: it adds home's height above the sea, in
+single precision. A billionth was refused."""
+
+FLIES = FLOWN_TO | {Command.NAV_RETURN_TO_LAUNCH, 187, 211, 4501, 42600}
+"""What checkTakeoff counts as flying: actuators, grippers, winches and gates as well."""
 
 
 def _heading(value: float) -> float:
