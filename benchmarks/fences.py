@@ -43,7 +43,7 @@ def random_starts(problem: Problem, count: int, rng: np.random.Generator) -> lis
     """Feasible flights, each by way of a place at random that time allows."""
     area, kin = problem.free_area, problem.kinematics
     assert area is not None
-    places = np.stack([kin.start, kin.end, *(link.station for link in problem.links)])
+    places = np.stack([kin.start, kin.end, *(link.gains.station for link in problem.links)])
     low, high = places.min(axis=0) - 60, places.max(axis=0) + 60
     flights: list[Trajectory] = []
     for _ in range(20 * count):

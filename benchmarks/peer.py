@@ -47,8 +47,8 @@ class ClassRate:
     @property
     def gain(self) -> float:
         """g at the foot of the station: c times it is of the order of one to a hundred."""
-        assert isinstance(self.link.law, PathGain)
-        return self.link.law.reference_gain / self.link.altitude**2
+        assert isinstance(self.link.gains.law, PathGain)
+        return self.link.gains.law.reference_gain / self.link.gains.height**2
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
     names: list[str] = (
         ["straight", "bs", "user", "bs-user", "user-bs"] if "global" in named else [*named]
     )
-    places = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    places = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
     rng, kin = np.random.default_rng(0), problem.kinematics
     corners = np.stack([*places.values(), kin.start, kin.end])
     low, high = corners.min(axis=0) - 50, corners.max(axis=0) + 50
@@ -129,16 +129,16 @@ def at_best(link: Link, w: Real) -> ClassRate:
 
 def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     """The rate (1, n) at scaled positions w (2, n), c (k, n) in units of 1 / `gain`."""
-    p, H = rate.link.station / LENGTH, rate.link.altitude / LENGTH
+    p, H = rate.link.gains.station / LENGTH, rate.link.gains.height / LENGTH
     away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
-    law, squared = rate.link.law, ca.sum1(away**2) + H**2
+    law, squared = rate.link.gains.law, ca.sum1(away**2) + H**2
     assert isinstance(law, PathGain)
     s = H / ca.sqrt(squared)
     terms = sum(c * s**k for k, c in enumerate(law.elevation_db, 1)) * np.log(10) / 10
     gain_log = terms - law.exponent / 2 * ca.log(squared * LENGTH**2)
     if isinstance(rate, Curve):
         return rate.value(gain_log + np.log(law.reference_gain))
-    D = ca.repmat(ca.exp(gain_log) * rate.link.altitude**2, c.shape[0], 1) * c
+    D = ca.repmat(ca.exp(gain_log) * rate.link.gains.height**2, c.shape[0], 1) * c
     total = rate.base + ca.mtimes(ca.DM(rate.multiplicity).T, ca.exp(-D))
     return rate.offset - rate.factor * ca.log(total) / np.log(2.0)
 

@@ -162,7 +162,7 @@ def _routes(
     and `known`, that of a similar plan, or this `alone`.
     """
     kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
-    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    stations = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
     names = ("straight",) if alone else by_name(problem.plan.optimizer.starts)
     routes = (
         starts_inside(kin, names, stations, problem.free_area, fenced)

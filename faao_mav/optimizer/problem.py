@@ -27,6 +27,7 @@ from faao_mav.radio.constellation import (
     difference_classes,
 )
 from faao_mav.radio.gain import GainFunction
+from faao_mav.radio.gain_field import GainField
 from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.rate_steps import StreamRate, one_stream
 from faao_mav.radio.relay import RelayQueue
@@ -45,24 +46,21 @@ makes the P (..., N_t, N_t), tr(P P^H) = W, of each."""
 class Link:
     """One hop: (1) or (2) with its share of (13).
 
-    `station` is p_B or p_U (2,), `altitude` H, `power` W_B or W_U (W), `noise` sigma² (W), `law`
-    the path gain;
-    `receive` and `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
+    `gains` is the path gain over the map, `power` W_B or W_U (W), `noise` sigma² (W); `receive` and
+    `transmit` are the antenna counts. `nlos` is the Rayleigh part: a known draw per
     slot (N + 2, N_r, N_t), draws to be averaged over (S, 1, N_r, N_t), or None for the line of
     sight alone. `measure` is the rate that counts, `optimizer.rate`. With `steps` the rates are
     these, of one stream, whatever the alphabet.
     """
 
     name: str
-    station: Real
-    altitude: float
+    gains: GainField
     to_relay: bool
     power: float
     noise: float
     receive: int
     transmit: int
     modulation: str
-    law: GainFunction
     rician_factor: float
     line_of_sight: str
     nlos: Complex | None
@@ -101,19 +99,14 @@ class Link:
             1.0 if self.nlos is None else math.sqrt(self.rician_factor / (1 + self.rician_factor))
         )
 
-    def gain(self, w: Real) -> Real:
-        """Return the linear path gain (...) at the positions w (..., 2)."""
-        squared_distance = np.sum((w - self.station) ** 2, axis=-1) + self.altitude**2
-        return self.law.gain(squared_distance, self.altitude)
-
     def small_scale(self, w: Real) -> Complex:
         """Return H_r, the bracket of (1) or (2), at the positions w (N + 2, 2).
 
         (N + 2, N_r, N_t); with fading that is averaged over, a leading axis of draws.
         """
-        away = w - self.station
-        d = np.sqrt(np.sum(away**2, axis=1) + self.altitude**2)
-        return self.fade(self.line_of_sight_at(away[:, 0] / d))
+        away = self.gains.away(w.T)
+        d = np.sqrt(self.gains.squared_distance(away))
+        return self.fade(self.line_of_sight_at(away[0] / d))
 
     def line_of_sight_at(self, cosine: Real) -> Complex:
         """Return H^LoS (..., N_r, N_t) at direction cosines u = (x - x_j) / d (...)."""
@@ -139,7 +132,7 @@ class Link:
 
     def channel(self, w: Real, H_r: Complex) -> Complex:
         """Return H = sqrt(gain) H_r, (1) or (2), at the positions w (N + 2, 2)."""
-        return np.sqrt(self.gain(w))[:, None, None] * H_r
+        return np.sqrt(self.gains.gain(w.T))[:, None, None] * H_r
 
     def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
         """Return the rate of every slot, bits (N + 2,), its mean where H_r has draws."""
@@ -320,15 +313,13 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
                 nlos = None
         return Link(
             name=name,
-            station=np.array(position),
-            altitude=plan.flight.altitude,
+            gains=GainField(law, np.array(position), plan.flight.altitude),
             to_relay=to_relay,
             power=power,
             noise=noise,
             receive=receive,
             transmit=transmit,
             modulation=radio.modulation,
-            law=law,
             rician_factor=radio.rician_factor,
             line_of_sight=radio.line_of_sight,
             nlos=nlos,

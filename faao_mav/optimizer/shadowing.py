@@ -20,8 +20,8 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.rates.spline import Spline
 from faao_mav.optimizer.solution import Solution
+from faao_mav.radio.spline import Spline
 
 SHADOWINGS, _COMPARED = 400, 200
 """Shadowings of which quantiles are told, with an error of 7 % of the standard deviation, and by

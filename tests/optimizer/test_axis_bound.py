@@ -54,7 +54,7 @@ def test_every_step_of_a_flight_is_in_reach(
     instants, _, _ = cells.times
     n = np.minimum((instants / kin.time_step).astype(int), kin.slots - 2)
     tau = (instants - kin.time_step * n)[:, None]
-    first, second = (link.station for link in cells.problem.links)
+    first, second = (link.gains.station for link in cells.problem.links)
     axis = (second - first) / np.hypot(*(second - first))
     x = (flight.w[n] + tau * flight.v[n] + tau**2 / 2 * flight.a[n] - first) @ axis
     v = (flight.v[n] + tau * flight.a[n]) @ axis

@@ -123,8 +123,8 @@ def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> N
     for kind in ("ula", "all_ones"):
         problem = build_problem(small_plan(FAINT | {"radio.line_of_sight": kind}))
         link = problem.uav_user
-        w = link.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
-        r = np.linalg.norm(w - link.station, axis=1)
+        w = link.gains.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
+        r = np.linalg.norm(w - link.gains.station, axis=1)
         values, exact = best_rates(problem, link, r[:, None])
         H = link.channel(w, link.small_scale(w))
         true = link.draw_rates(H, link.best(H[:, None]))

@@ -40,7 +40,7 @@ def long_plan(power: int, starts: list[str]) -> Plan:
 
 def starts_of(problem: Problem) -> dict[str, Trajectory]:
     """Return the flights that the plan starts from."""
-    stations = {"bs": problem.bs_uav.station, "user": problem.uav_user.station}
+    stations = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
     return starts(problem.kinematics, by_name(problem.plan.optimizer.starts), stations)
 
 

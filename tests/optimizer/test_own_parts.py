@@ -75,7 +75,7 @@ def test_a_rate_of_ones_own_is_planned_priced_and_bounded() -> None:
     quiet = plan(**{"radio.fading": "none"})
     result = plan_mission(quiet, rate=Shannon(), bound=True)
     solution, (link, _) = result.solution, result.solution.problem.links
-    d2 = np.sum((solution.w - link.station) ** 2, axis=1) + link.altitude**2
+    d2 = np.sum((solution.w - link.gains.station) ** 2, axis=1) + link.gains.height**2
     # the arrays' full gain: of one stream over a line of sight of rank one
     snr = link.power / link.noise * quiet.radio.reference_gain / d2 * link.receive * link.transmit
     np.testing.assert_allclose(solution.I_U, Shannon().value(snr), rtol=1e-3)

@@ -32,7 +32,7 @@ def hessian_by_differences(f: Callable[[Real], Real], w: Real, h: float = 0.05) 
 
 def places(link: Link, seed: int = 3) -> Real:
     rng = np.random.default_rng(seed)
-    return link.station + rng.uniform(-150, 150, (20, 2))
+    return link.gains.station + rng.uniform(-150, 150, (20, 2))
 
 
 def coordinates(link: Link, w: Real) -> tuple[Real, Real]:
@@ -244,7 +244,7 @@ def test_the_best_rate_falls_with_the_distance_and_not_with_the_direction(
     link, wanted = build_problem(plan).uav_user, design(plan)
     angle = np.linspace(0, 2 * np.pi, 9)
     circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    rings = [exactly(link, wanted, link.station + r * circle) for r in (20, 60, 120)]
+    rings = [exactly(link, wanted, link.gains.station + r * circle) for r in (20, 60, 120)]
     for ring in rings:
         assert np.ptp(ring) < 1e-5
     assert rings[0].min() > rings[1].max() > rings[1].min() > rings[2].max()

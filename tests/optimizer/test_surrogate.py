@@ -27,7 +27,8 @@ def test_27_has_the_bound_of_proposition_1(small_plan: MakePlan, seed: int, step
     """exp(-D^lb), D^lb the tangent of D in ||w - p||²: never below exp(-D), and equal about w_i."""
     rng = np.random.default_rng(seed)
     altitude, station = rng.uniform(20, 200), rng.uniform(-300, 300, 2)
-    link = replace(build_problem(small_plan()).bs_uav, station=station, altitude=altitude)
+    link = build_problem(small_plan()).bs_uav
+    link = replace(link, gains=replace(link.gains, station=station, height=altitude))
     w_i = rng.uniform(-300, 300, (4, 2))
     w = w_i + step * rng.standard_normal((4, 2))
     y, y_i = (np.sum((at - station) ** 2, axis=1) for at in (w, w_i))

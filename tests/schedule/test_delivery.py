@@ -40,7 +40,7 @@ def test_a_displaced_flight_is_priced_slot_by_slot(solution: Solution) -> None:
     I_U, _ = rates_along(solution, w)
     link = solution.problem.bs_uav
     for n in (0, 7, len(w) - 1):
-        d2 = np.sum((w[n] - link.station) ** 2) + link.altitude**2
+        d2 = np.sum((w[n] - link.gains.station) ** 2) + link.gains.height**2
         H_r = link.small_scale(w)[..., n, :, :]
         H = np.sqrt(solution.plan.radio.reference_gain / d2) * H_r
         expected = cutoff_rate(H, solution.P_B[..., n, :, :], link.classes, link.noise)

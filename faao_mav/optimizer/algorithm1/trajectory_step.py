@@ -40,14 +40,14 @@ class SumOfExponentials:
 
     def value(self, w: Real) -> float:
         """Return the sum over slots and non-zero classes of multiplicity exp(-D) at w."""
-        d2 = np.sum((w - self.link.station) ** 2, axis=-1) + self.link.altitude**2
+        d2 = np.sum((w - self.link.gains.station) ** 2, axis=-1) + self.link.gains.height**2
         return float((self.link.classes.multiplicity * np.exp(-self.A / d2[:, None])).sum())
 
 
 def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
     """Return the constraint of `link` for H_r (N + 2, N_r, N_t) and P (N + 2, N_t, N_t)."""
     slots, classes = len(H_r), link.classes
-    rho_0 = link.law.gain(np.ones(1), link.altitude)
+    rho_0 = link.gains.law.gain(np.ones(1), link.gains.height)
     A = rho_0 * exponents(H_r, P, classes.vectors, link.noise)
     # O_B, O_U = 2 (N + 2) N_t log2 rho
     return SumOfExponentials(link, A, slots * (2 * classes.bits - classes.symbols))
@@ -107,14 +107,16 @@ def convex_bound(
     classes.
     """
     link = s.link
-    y_i = np.sum((w_i - link.station) ** 2, axis=1)
-    d2 = y_i + link.altitude**2
+    y_i = np.sum((w_i - link.gains.station) ** 2, axis=1)
+    d2 = y_i + link.gains.height**2
     c = s.A / d2[:, None]
     c = rounded(c * shrink(c))
     slot, classes = np.divmod(np.arange(c.size), c.shape[1])
     weight = rounded(np.log(link.classes.multiplicity / gap))[classes]
     q = cp.Variable(len(w_i))
-    offset = cp.multiply(LENGTH / np.sqrt(d2)[:, None] * np.ones(2), w - link.station / LENGTH)
+    offset = cp.multiply(
+        LENGTH / np.sqrt(d2)[:, None] * np.ones(2), w - link.gains.station / LENGTH
+    )
     select = sp.csr_array((c.ravel(), (np.arange(c.size), slot)), shape=(c.size, len(w_i)))
     terms = cp.exp(select @ q - c.ravel() + weight)
     return cp.sum(terms), [cp.sum(cp.square(offset), axis=1) - y_i / d2 <= q]

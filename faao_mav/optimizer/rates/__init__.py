@@ -71,13 +71,11 @@ class RateModel(Protocol):
 class LinkCoordinates:
     """The positions w as the station of `link` sees them.
 
-    `away` (2, ..., n) are w - p in metres, `squared_distance` (..., n) is d² in m², `gain_log`
-    (..., n) is l and `cosine` (..., n) is u.
+    `w` (2, ..., n) are the positions, m, `gain_log` (..., n) is l and `cosine` (..., n) is u.
     """
 
     link: Link
-    away: Real
-    squared_distance: Real
+    w: Real
     gain_log: Real
     cosine: Real
 
@@ -87,7 +85,7 @@ class LinkCoordinates:
         Returns:
             R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per m².
         """
-        l_i, l_ij = self.link.law.slopes(self.away, self.squared_distance, self.link.altitude)
+        l_i, l_ij = self.link.gains.slopes(self.w)
         gradient = rate.by_l * l_i
         hessian = rate.by_l * l_ij + rate.by_ll * products(l_i, l_i)
         if rate.by_u is not None and rate.by_lu is not None and rate.by_uu is not None:
@@ -99,8 +97,8 @@ class LinkCoordinates:
 
     def _cosine_slopes(self) -> tuple[Real, Real]:
         """Return gradient (2, ..., n) and Hessian (3, ..., n) of u = x / d by w."""
-        x, y = self.away
-        r = 1 / np.sqrt(self.squared_distance)
+        x, y = away = self.link.gains.away(self.w)
+        r = 1 / np.sqrt(self.link.gains.squared_distance(away))
         r3, r5 = r**3, 3 * r**5
         u_i = np.stack([r - x * x * r3, -x * y * r3])
         u_ij = np.stack([x * (x * x * r5 - 3 * r3), y * (x * x * r5 - r3), x * (y * y * r5 - r3)])
@@ -109,8 +107,6 @@ class LinkCoordinates:
 
 def link_coordinates(link: Link, w: Real) -> LinkCoordinates:
     """Return the coordinates of the positions w (2, ..., n), m, for the station of `link`."""
-    away = np.stack([w[0] - link.station[0], w[1] - link.station[1]])
-    squared_distance = np.sum(away**2, axis=0) + link.altitude**2
-    gain_log = link.law.log(squared_distance, link.altitude)
-    cosine = away[0] / np.sqrt(squared_distance)
-    return LinkCoordinates(link, away, squared_distance, gain_log, cosine)
+    away = link.gains.away(w)
+    cosine = away[0] / np.sqrt(link.gains.squared_distance(away))
+    return LinkCoordinates(link, w, link.gains.log(w), cosine)

@@ -61,7 +61,7 @@ def rate_field(problem: Problem, design: Design, width: float | None = None) -> 
     reach = kin.max_speed * kin.time_step * (kin.slots - 1)
     farthest = []
     for link in links:
-        from_ends = max(np.linalg.norm(end - link.station) for end in (kin.start, kin.end))
+        from_ends = max(np.linalg.norm(end - link.gains.station) for end in (kin.start, kin.end))
         farthest.append(float(from_ends) + reach / 2)
     return RateField(links, rate_models(links, design, farthest))
 
@@ -77,8 +77,8 @@ def rate_models(
     for link, distance in zip(links, farthest, strict=True):
         if kind_of(link, design):
             tabled.append(link)
-            turns = link.law.turns(distance, link.altitude)
-            spans.append(link.law.log(turns**2 + link.altitude**2, link.altitude))
+            turns = link.gains.law.turns(distance, link.gains.height)
+            spans.append(link.gains.law.log(turns**2 + link.gains.height**2, link.gains.height))
     tables = iter(table_rates(tabled, design, spans))
     return tuple(
         next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links

@@ -23,8 +23,8 @@ from faao_mav.arrays import Complex, Flags, Integers, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import RatePartials
-from faao_mav.optimizer.rates.spline import Spline
 from faao_mav.radio.gain import PER_DB
+from faao_mav.radio.spline import Spline
 
 Kind: TypeAlias = Literal["curve", "surface", "modes"]
 

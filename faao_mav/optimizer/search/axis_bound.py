@@ -99,14 +99,14 @@ class AxisBound:
     @cached_property
     def axis(self) -> Real:
         """The direction (2,) from the first station to the second."""
-        first, second = (link.station for link in self.problem.links)
+        first, second = (link.gains.station for link in self.problem.links)
         apart = float(np.hypot(*(second - first)))
         return np.asarray((second - first) / apart if apart > 0 else np.array([1.0, 0.0]))
 
     @cached_property
     def places(self) -> tuple[Real, Real]:
         """Start, end and both stations along and across the axis, (4,) each, m."""
-        kin, stations = self.problem.kinematics, [link.station for link in self.problem.links]
+        kin, stations = self.problem.kinematics, [link.gains.station for link in self.problem.links]
         c, s = self.axis
         x, y = (np.array([kin.start, kin.end, *stations]) - stations[0]).T
         return c * x + s * y, c * y - s * x

@@ -31,7 +31,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     exact = link.closed_form and link.measure == "cutoff"
     if link.steps is not None:
         link = replace(link, steps=link.steps.above(_WIDTH))
-    gain_log = link.law.log(r**2 + link.altitude**2, link.altitude).T
+    gain_log = link.gains.law.log(r**2 + link.gains.height**2, link.gains.height).T
     if link.nlos is not None and not optimal.averaged:
         singular = _largest_singular_values(link, len(r))
         H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)

@@ -59,7 +59,7 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
     half = relay is not None and relay.half
     value = ceiling
     if value > (1 + _TIGHT) * known:
-        corners = np.vstack([kin.start, kin.end, *(link.station for link in problem.links)])
+        corners = np.vstack([kin.start, kin.end, *(link.gains.station for link in problem.links)])
         extent = float(np.ptp(corners, axis=0).max())
         # there is no way from rest to v_max and back to rest
         accelerating = kin.max_speed**2 / kin.max_acceleration > extent
@@ -67,7 +67,7 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
             tell(1, "the bound by the axis", value)
             value = min(value, axis_bound(problem, rates))
         # the axis takes the most of all larger distances: with a gain that rises there, too much
-        other = any(not link.law.square for link in problem.links)
+        other = any(not link.gains.law.square for link in problem.links)
         if not accelerating or half or problem.free_area is not None or other:
             tell(1, "the bound over the map", value)
             value = min(value, map_bound(problem, rates))
@@ -80,7 +80,7 @@ def radial_rates(problem: Problem) -> tuple[RadialRates, bool]:
     """Return upper bounds on the best rates by distance, and whether the best ones are exact."""
     kin, links = problem.kinematics, problem.links
     known = any(link.nlos is not None and not link.averaged for link in links)
-    ends = [np.hypot(*(end - link.station)) for end in (kin.start, kin.end) for link in links]
+    ends = [np.hypot(*(end - link.gains.station)) for end in (kin.start, kin.end) for link in links]
     r = np.linspace(
         0.0,
         float(max(ends)) + float(kin.longest_ways()[0][-1]) / 2,

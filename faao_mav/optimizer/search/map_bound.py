@@ -65,7 +65,7 @@ def at_ends(problem: Problem, rates: RadialRates, price: float) -> float:
     kin, links = problem.kinematics, problem.links
     (U_0, U_1), (G_0, G_1) = (
         [
-            float(rates.at(j, slot, np.array([np.hypot(*(end - link.station))]), 0.0)[0])
+            float(rates.at(j, slot, np.array([np.hypot(*(end - link.gains.station))]), 0.0)[0])
             for slot, end in ((0, kin.start), (-1, kin.end))
         ]
         for j, link in enumerate(links)
@@ -101,7 +101,7 @@ class MapBound:
     @classmethod
     def over(cls, problem: Problem, rates: RadialRates, cells: int, reach: float) -> "MapBound":
         """Return the bound of `problem` over about so many cells, and steps of `reach` cells."""
-        stations = np.array([link.station for link in problem.links])
+        stations = np.array([link.gains.station for link in problem.links])
         kin, free = problem.kinematics, problem.free_area
         return cls(problem, rates, cells_of(kin, stations, cells, reach, free))
 
@@ -136,7 +136,7 @@ class MapBound:
             off = CORNER * cells.side + gap * abs(tau) + kin.max_acceleration * tau**2 / 2
             for j, link in enumerate(self.problem.links):
                 for i, v in enumerate(velocities):
-                    place = (link.station - v * tau)[:, None, None]
+                    place = (link.gains.station - v * tau)[:, None, None]
                     away = np.maximum(0.0, np.hypot(*(cells.x - place)) - off)
                     found[j, number % parts, i] += self.rates.at(j, slot, away, 2 * off)
         return found

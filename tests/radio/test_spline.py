@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import interpolate
 
-from faao_mav.optimizer.rates.spline import Spline
+from faao_mav.radio.spline import Spline
 
 VALUES = st.lists(st.floats(-100, 100), min_size=4, max_size=30)
 NOWHERE = np.zeros(1)

@@ -1,0 +1,73 @@
+"""The path gain of a hop over the map: its law about the station, and what lies above it by place.
+
+In natural logarithms, at a place w of the aircraft in slot n,
+
+    l_n(w) = law(||w - p_n||^2 + H^2) + above(w)
+
+with p_n the place of the station, which may move, and `above`, by default nothing, from a map.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from faao_mav.arrays import Real
+from faao_mav.radio.gain import PER_DB, GainFunction
+
+
+class Surface(Protocol):
+    """A function f of the place (x, y), m; beyond its edge that of the nearest point on it."""
+
+    def value(self, x: Real, y: Real) -> Real:
+        """Return f at x (...) and y (...)."""
+
+    def by_both(self, x: Real, y: Real) -> tuple[Real, Real, Real, Real, Real, Real]:
+        """Return f, f_x, f_y, f_xx, f_xy and f_yy, where they exist."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainField:
+    """The path gain of a hop, the aircraft `height` m above the station, which is at `station`, m.
+
+    `station` is (2,), or (n, 2) where it moves: its places in the n slots. `above` are dB over the
+    `law`.
+
+    >>> from faao_mav.radio.gain import PathGain
+    >>> field = GainField(PathGain(1e-5), np.array([0.0, 30.0]), 40.0)
+    >>> (field.log(np.array([[0.0], [0.0]])) / PER_DB).round(2)  # d = 50 m
+    array([-83.98])
+    """
+
+    law: GainFunction
+    station: Real
+    height: float
+    above: Surface | None = None
+
+    def away(self, w: Real) -> Real:
+        """Return w - p (2, ..., n) at positions w (2, ..., n), m."""
+        return w - self.station.T.reshape(2, *[1] * (w.ndim - 2), -1)
+
+    def squared_distance(self, away: Real) -> Real:
+        """Return d² (...), m², of the antennas at w - p = `away` (2, ...)."""
+        return np.asarray(np.sum(away**2, axis=0) + self.height**2)
+
+    def log(self, w: Real) -> Real:
+        """Return l (..., n) at positions w (2, ..., n), m."""
+        found = self.law.log(self.squared_distance(self.away(w)), self.height)
+        return found if self.above is None else found + PER_DB * self.above.value(*w)
+
+    def gain(self, w: Real) -> Real:
+        """Return the linear gain (..., n) at positions w (2, ..., n), m."""
+        found = self.law.gain(self.squared_distance(self.away(w)), self.height)
+        return found if self.above is None else found * np.exp(PER_DB * self.above.value(*w))
+
+    def slopes(self, w: Real) -> tuple[Real, Real]:
+        """Return gradient (2, ..., n) and Hessian xx, xy, yy (3, ..., n) of l by w (2, ..., n)."""
+        away = self.away(w)
+        gradient, hessian = self.law.slopes(away, self.squared_distance(away), self.height)
+        if self.above is not None:
+            _, x, y, xx, xy, yy = self.above.by_both(*w)
+            gradient = gradient + PER_DB * np.stack([x, y])
+            hessian = hessian + PER_DB * np.stack([xx, xy, yy])
+        return gradient, hessian
