@@ -1,0 +1,119 @@
+"""A map of a hop's gain: dB over a regular grid of east and north, at one height or several.
+
+It is the gain itself, or what the gain is above a law. Between the points of the grid a map is
+bilinear, between its heights linear: so flights are priced. The optimiser has the bicubic spline
+through the grid smoothed over a cell: slopes that it can follow, and no edge that it does not see.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.radio.spline import Spline
+
+_KERNEL = np.array([0.25, 0.5, 0.25])
+"""Weights of a point of the grid and its neighbours when a map is smoothed, along each side."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainMap:
+    """dB over the map: `db` (j, m, k) at `heights` (j,), `north` (m,) and `east` (k,), m.
+
+    Places and heights count from the origin of the plan, `heights` rise, both sides have even
+    steps. With `above_law` the `db` are above a law, and 0 off the map; otherwise they are the
+    gain, which is known on the map alone. NaN is where no aircraft can be, as below ground;
+    `ground` (m, k) is how high ground and what stands on it are, m, where the map tells it.
+    """
+
+    east: Real
+    north: Real
+    heights: Real
+    db: Real
+    above_law: bool = False
+    ground: Real | None = None
+
+    def at(self, height: float) -> "Grid":
+        """Return the map at a `height`, m; at the nearest of its own where that is beyond them.
+
+        What is not known there is as at the nearest point that is.
+        """
+        db = self._between(height)
+        if np.isnan(db).any():
+            db = _filled(db)
+        if not self.above_law:
+            return Grid(self.east, self.north, db.T)
+        x, y = (_widened(side) for side in (self.east, self.north))
+        return Grid(x, y, np.pad(db.T, 1))
+
+    def barred(self, height: float) -> Flags:
+        """Return where no aircraft can be at a `height`, m: (m, k)."""
+        barred = np.isnan(self._between(height))
+        return barred if self.ground is None else barred | (self.ground >= height)
+
+    def _between(self, height: float) -> Real:
+        k = np.interp(height, self.heights, np.arange(len(self.heights)))
+        low, high, share = int(np.floor(k)), int(np.ceil(k)), float(k % 1)
+        return np.asarray((1 - share) * self.db[low] + share * self.db[high])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """A bilinear function f, `values` (k, m) on the even grids `x` (k,) and `y` (m,), m.
+
+    Beyond them f is that of the nearest point.
+
+    >>> side = np.array([0.0, 10.0])
+    >>> grid = Grid(side, side, np.array([[0.0, 2.0], [4.0, 6.0]]))
+    >>> float(grid.value(np.array(5.0), np.array(10.0)))
+    4.0
+    """
+
+    x: Real
+    y: Real
+    values: Real
+
+    def value(self, x: Real, y: Real) -> Real:
+        """Return f at x (...) and y (...)."""
+        (i, s), (j, t) = _located(self.x, x), _located(self.y, y)
+        f = self.values
+        low = (1 - t) * f[i, j] + t * f[i, j + 1]
+        return np.asarray((1 - s) * low + s * ((1 - t) * f[i + 1, j] + t * f[i + 1, j + 1]))
+
+    def by_both(self, x: Real, y: Real) -> tuple[Real, Real, Real, Real, Real, Real]:
+        """Return f, f_x, f_y, f_xx, f_xy and f_yy, within the cells."""
+        (i, s), (j, t) = _located(self.x, x), _located(self.y, y)
+        f, dx, dy = self.values, self.x[1] - self.x[0], self.y[1] - self.y[0]
+        near, far = f[i, j + 1] - f[i, j], f[i + 1, j + 1] - f[i + 1, j]
+        f_x = ((1 - t) * (f[i + 1, j] - f[i, j]) + t * (f[i + 1, j + 1] - f[i, j + 1])) / dx
+        f_y = ((1 - s) * near + s * far) / dy
+        none = np.zeros_like(f_x)
+        return self.value(x, y), f_x, f_y, none, (far - near) / (dx * dy), none
+
+    def smoothed(self) -> Spline:
+        """Return the bicubic spline through the grid smoothed over a cell."""
+        padded = np.pad(self.values, 1, mode="edge")
+        along = sum(w * padded[k : k + len(self.x)] for k, w in enumerate(_KERNEL))
+        smooth = sum(w * along[:, k : k + len(self.y)] for k, w in enumerate(_KERNEL))
+        return Spline.through(self.x, self.y, np.asarray(smooth))
+
+
+def _located(grid: Real, x: Real) -> tuple[Integers, Real]:
+    """Return the cells of x (...) on an even grid, and the share of a cell that x is into it."""
+    at = np.clip((x - grid[0]) / (grid[1] - grid[0]), 0.0, len(grid) - 1.0)
+    cell = np.minimum(at.astype(np.intp), len(grid) - 2)
+    return cell, at - cell
+
+
+def _widened(side: Real) -> Real:
+    """Return an even grid with one point more at both ends."""
+    step = side[1] - side[0]
+    return np.concatenate([[side[0] - step], side, [side[-1] + step]])
+
+
+def _filled(db: Real) -> Real:
+    """Return `db` (m, k) with the nearest known value where it is NaN."""
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(np.isnan(db), return_distances=False, return_indices=True)
+    return np.asarray(db[tuple(nearest)])
