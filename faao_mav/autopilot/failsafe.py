@@ -1,98 +1,118 @@
-"""What a vehicle does by itself when a link, its battery or its position is lost."""
+"""What a vehicle does by itself when a link, its battery or its position is lost: `failsafes.tsv`.
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TypeAlias
+A row of the table is one stage of what a vehicle does about a loss. Its columns, "-" for nothing:
+the vehicle and the loss; `defaults`, the parameters of the stage with the autopilot's defaults (a
+whole number is one of 32 bits on PX4's wire), and `absent`, those that count in versions without
+the parameter; `off`, values with which it does nothing; `flies on by`, a parameter and its bits in
+a mission and in a flight by setpoints by which it flies on; `decides`, the parameter whose values
+from 1 on have what it `does`, apart by bars ("": not known; names in braces stand for values), and
+`idle` those with which it does nothing; `after` whose seconds it acts, `below` which limits, of
+which 0 is none, and `when`, in words.
+
+Sources: ArduPilot's lists of parameters and events of Copter and Plane 4.1 to 4.7; PX4 1.14 to
+1.16: parameter reference, and the module commander (behaviour of its failsafes).
+"""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import NamedTuple, TypeAlias
 
 Values: TypeAlias = Mapping[str, float]
 """Parameters by the autopilot's names, in its units."""
 
 
-@dataclass(frozen=True, slots=True)
-class Response:
+class Response(NamedTuple):
     """What a vehicle does about a loss, as the end of a sentence; `acts`: it does anything."""
 
     text: str
-    acts: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """What a vehicle does by the value of the parameter `decides`."""
-
-    decides: str
-    # What it does by that value, from 1 on; "" for what is not known. Names in braces stand for the
-    # values of parameters
-    does: Sequence[str]
-    # The values with which it does nothing, or goes on with its mission
-    idle: Collection[int] = (0,)
-    after: str = ""  # The parameter that says after how many seconds it acts
-    # Parameters below which it acts, 0 for none, with their units
-    below: Mapping[str, str] = field(default_factory=dict)
-    when: str = ""  # When that is, as the beginning of what it does
-
-    def told(self, values: Values) -> Response:
-        """Return what it does by `values`; nothing to tell where none of its limits is set."""
-        limits = [f"{values[name]:g} {unit}" for name, unit in self.below.items() if values[name]]
-        if self.below and not limits:
-            return Response("", acts=False)
-        number, set_to = int(values[self.decides]), f"{self.decides} {values[self.decides]:g}"
-        does = dict(enumerate(self.does, 1)).get(number, "")
-        if does:
-            text = f"{does.format_map(values)} ({set_to})"
-        elif number in self.idle:
-            return Response(f"{self.when}does nothing ({set_to})", acts=False)
-        else:
-            text = f"does what {set_to} says, which is not known here"
-        text += f" after {values[self.after]:g} s ({self.after})" if self.after else ""
-        text += f" at {' or '.join(limits)}" if limits else ""
-        return Response(f"{self.when}{text}", number not in self.idle)
+    acts: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Failsafe:
-    """What a vehicle does when `loss`, the beginning of a sentence, happens in flight."""
+    """What a vehicle does when `loss`, the beginning of a sentence, happens in flight.
+
+    `stages` are its rows of the table, `defaults` the parameters that decide, as they come, and
+    `absent` the values that count in versions that lack the parameter.
+    """
 
     loss: str
-    # The parameters that decide, with the autopilot's defaults; a whole number is one of 32 bits on
-    # PX4's wire
+    stages: tuple[Mapping[str, str], ...]
     defaults: Values
-    # What it does, by its parameters; without any it always does what `always` says
-    actions: tuple[Action, ...] = ()
-    always: str = ""
-    # The values of parameters with which it does nothing
-    off: Mapping[str, Collection[float]] = field(default_factory=dict)
-    # The parameter, and its bits in a mission and in a flight by setpoints, by which it flies on
-    exceptions: tuple[str, int, int] | None = None
-    # The values that count in versions that lack the parameter
-    absent: Values = field(default_factory=dict)
+    absent: Values
 
     def told(self, values: Values, *, streamed: bool) -> Response | None:
         """Return what a vehicle with these `values` does; None where one that decides is missing.
 
         `streamed`: in a flight by setpoints, else by its mission.
 
-        >>> failsafe = Failsafe("RC lost", {"FS": 1.0}, (Action("FS", ("returns",)),))
-        >>> failsafe.told({"FS": 1.0}, streamed=False)
-        Response(text='returns (FS 1)', acts=True)
-        >>> failsafe.told({"FS": 0.0}, streamed=False)
-        Response(text='does nothing (FS 0)', acts=False)
+        >>> failsafe = failsafes("px4")[1]
+        >>> failsafe.told({"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 10}, streamed=False)
+        Response(text='returns (NAV_DLL_ACT 2) after 10 s (COM_DL_LOSS_T)', acts=True)
         >>> failsafe.told({}, streamed=False) is None
         True
         """
         values = {**self.absent, **values}
         try:
-            for name, off in self.off.items():
-                if values[name] in off:
-                    return Response(f"does nothing ({name} {values[name]:g})", acts=False)
-            told = [action.told(values) for action in self.actions]
-            acts = self.always != "" or any(each.acts for each in told)
-            if acts and self.exceptions is not None:
-                name, *bits = self.exceptions
-                if int(values[name]) & bits[streamed]:
+            told = [_told(stage, values) for stage in self.stages]
+            acts = any(each.acts for each in told)
+            if acts and (exception := self.stages[0]["flies on by"]):
+                name, *bits = exception.split()
+                if int(values[name]) & int(bits[streamed]):
                     return Response(f"flies on ({name} {values[name]:g})", acts=False)
         except KeyError:
             return None
-        text = "; ".join(each.text for each in told if each.text)
-        nothing = f"does nothing: {' and '.join(self.actions[0].below)} are 0" if told else ""
-        return Response(text or self.always or nothing, acts)
+        return Response("; ".join(dict.fromkeys(each.text for each in told if each.text)), acts)
+
+
+def _told(stage: Mapping[str, str], values: Values) -> Response:
+    """Return what a vehicle with these `values` does by a `stage`; "" for nothing to tell."""
+    name, _, off = stage["off"].partition("=")
+    if name and f"{values[name]:g}" in off.split(","):
+        return Response(f"does nothing ({name} {values[name]:g})", acts=False)
+    below = dict(each.split(" ", 1) for each in stage["below"].split("|") if each)
+    limits = [f"{values[name]:g} {unit}" for name, unit in below.items() if values[name]]
+    if below and not limits:
+        nothing = "" if stage["when"] else f"does nothing: {' and '.join(below)} are 0"
+        return Response(nothing, acts=False)
+    decides, does, when = stage["decides"], stage["does"].split("|"), stage["when"]
+    if not decides:
+        return Response(does[0], acts=True)
+    number, set_to = int(values[decides]), f"{decides} {values[decides]:g}"
+    text = does[number - 1] if 0 < number <= len(does) else ""
+    acts = str(number) not in stage["idle"].split(",")
+    if text:
+        text = f"{text.format_map(values)} ({set_to})"
+    elif not acts:
+        return Response(f"{when}does nothing ({set_to})", acts=False)
+    else:
+        text = f"does what {set_to} says, which is not known here"
+    text += f" after {values[stage['after']]:g} s ({stage['after']})" if stage["after"] else ""
+    return Response(f"{when}{text}{' at ' * bool(limits)}{' or '.join(limits)}", acts)
+
+
+@cache
+def failsafes(vehicle: str) -> tuple[Failsafe, ...]:
+    """Return what the `vehicle` of the table does, loss by loss.
+
+    >>> [each.loss for each in failsafes("arduplane")]
+    ['RC lost', 'ground station lost', 'battery low']
+    """
+    text = files("faao_mav.autopilot").joinpath("failsafes.tsv").read_text(encoding="utf-8")
+    found: dict[str, list[dict[str, str]]] = {}
+    for row in csv.DictReader(text.splitlines(), delimiter="\t"):
+        if row["vehicle"] == vehicle:
+            stage = {key: "" if value == "-" else value for key, value in row.items()}
+            found.setdefault(row["loss"], []).append(stage)
+
+    def numbers(stages: list[dict[str, str]], column: str) -> Values:
+        pairs = (each.split("=") for stage in stages for each in stage[column].split())
+        return {name: float(value) if "." in value else int(value) for name, value in pairs}
+
+    return tuple(
+        Failsafe(loss, tuple(stages), numbers(stages, "defaults"), numbers(stages, "absent"))
+        for loss, stages in found.items()
+    )

@@ -15,11 +15,11 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
+from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
 from faao_mav.autopilot.parameter import ParameterValues, Recommended
 from faao_mav.autopilot.px4.dialect import DIALECT
-from faao_mav.autopilot.px4.failsafes import FAILSAFES
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
 from faao_mav.autopilot.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.autopilot.vehicle_type import (
@@ -158,7 +158,7 @@ _px4_type = partial(
     # measured on 1.16.1
     home_outside_fence="PX4 says so (Geofence invalid), and flies the mission all the same",
     at_fence=_at_fence,
-    failsafes=FAILSAFES,
+    failsafes=failsafes("px4"),
     rally=_rally,
 )
 

@@ -6,8 +6,8 @@ from faao_mav.autopilot.ardupilot import ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.copter.flight_model import ArduCopter as ArduCopter
 from faao_mav.autopilot.ardupilot.copter.parameters import TABLE
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
-from faao_mav.autopilot.ardupilot.failsafes import COPTER_FAILSAFES
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
+from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import ParameterValues, Recommended
@@ -64,7 +64,7 @@ ARDUCOPTER = ardupilot_type(
     dialect=COPTER_DIALECT,
     whole_second_holds=True,
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
-    failsafes=COPTER_FAILSAFES,
+    failsafes=failsafes("arducopter"),
     flight_model=ArduCopter.from_vehicle,
     recommendation=Recommended(4.0, (0.5, 5.0), {"jerk": _JERK}, {"jerk": _LIVELIEST_JERK}),
     ceilings={"max_acceleration": ("lean_angle", "acceleration")},

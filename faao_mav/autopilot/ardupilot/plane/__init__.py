@@ -2,9 +2,9 @@
 
 from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
-from faao_mav.autopilot.ardupilot.failsafes import PLANE_FAILSAFES
 from faao_mav.autopilot.ardupilot.plane.flight_model import ArduPlane as ArduPlane
 from faao_mav.autopilot.body import ARDUPLANE_BODY
+from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import plane_orbit
 from faao_mav.autopilot.parameter import Parameter, row, rule, table
@@ -38,7 +38,7 @@ ARDUPLANE = ardupilot_type(
     dialect=PLANE_DIALECT,
     returns_at_least=False,
     at_fence=at_fence({0: "report"}),
-    failsafes=PLANE_FAILSAFES,
+    failsafes=failsafes("arduplane"),
     flight_model=ArduPlane.from_vehicle,
     ceilings={"max_acceleration": ("roll_limit",)},
     body=ARDUPLANE_BODY,
