@@ -10,11 +10,10 @@ from faao_mav.errors import InputError
 from faao_mav.fly.course import Setpoint, at_rest
 from faao_mav.fly.gate import LEVEL, Gate
 from faao_mav.fly.itinerary import Itinerary
-from faao_mav.fly.order import ACCEPTED, Order
 from faao_mav.fly.own import OwnClock, OwnFrame
 from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.telemetry import PATIENCE
-from faao_mav.fly.watch import Watch
+from faao_mav.fly.watch import ACCEPTED, Order, Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.wire.messages import (
     CommandLong,
@@ -22,7 +21,6 @@ from faao_mav.wire.messages import (
     GlobalPositionInt,
     GpsGlobalOrigin,
     Message,
-    MissionCurrent,
     Timesync,
 )
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
@@ -75,16 +73,22 @@ class Stream(Watch):
         super().__init__(peer, (), readiness, arm=True, lands=finish != "hover", rate=rate)
         if self._modes.guided is None:
             raise InputError("--stream: only copters fly by setpoints")
-        self._guided, self._rules = self._modes.guided, self._family.setpoints
+        self._flown, self._rules = self._modes.guided, self._family.setpoints
+        engage = MavCommand.SET_MODE, self._family.mode_parameters(self._flown)
+        self._starts = {"engaging": engage, "arming": (MavCommand.ARM, (1.0,))}
+        self._by_setpoints = self._rules.takes_off_by_setpoints
+        if not self._by_setpoints:
+            take_off = MavCommand.TAKEOFF, (*[0.0] * 6, plan.flight.altitude)
+            self._starts["starting"] = take_off
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if self._lands else "hold"]
         self._readiness = readiness
         self._height, self._top = plan.flight.altitude, plan.max_ground_speed
         self._period = 1 / rate
         self._held = 0.0 if self._rules.carries_on else self._period / 2
-        tell, takes_off = self.seen.told.append, not self._rules.takes_off_by_setpoints
+        tell = self.seen.told.append
         self._clock, self._gate = OwnClock(), Gate(plan, tell)
-        self.flight = Itinerary(solution, self._gate, tell, takes_off=takes_off)
+        self.flight = Itinerary(solution, self._gate, tell, takes_off=not self._by_setpoints)
         self._frame = OwnFrame(self._family, plan.origin)
         self._home_told = False
         self._unsure_since: float | None = None
@@ -117,16 +121,10 @@ class Stream(Watch):
             return out
         if self.phase == "flying" and now >= self._sent_by:
             return [*out, *self._give_up("for too long no setpoint could be sent", now)]
-        return [*out, self._clock.ask(now)]
-
-    # ---- before the flight
-
-    def _check(self, now: float) -> Sequence[Message]:
-        out = super()._check(now)
-        if self._frame.origin is None:
+        if self.phase == "checking" and self._frame.origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
             out = [*out, CommandLong(self._peer.address, *ask)]
-        return out
+        return [*out, self._clock.ask(now)]
 
     def _lacks(self, now: float) -> str:
         if self._frame.origin is None or not self.seen.fixes:
@@ -135,93 +133,63 @@ class Stream(Watch):
         late = f"its positions come {age:.0f} s late, by the clock of its TIMESYNC"
         return late if age > _OLD else super()._lacks(now)
 
-    def _set_out(self, now: float) -> Sequence[Message]:
-        self.seen.told.append("its own checks pass: it is set to follow setpoints, then armed")
-        self.phase, self._asked = "engaging", {self.seen.custom_mode}
-        if self._rules.takes_off_by_setpoints:
-            return ()  # setpoints come first
-        return self._set_mode(now, self._guided)
-
-    def _start(self, now: float) -> Sequence[Message]:
-        if self._rules.takes_off_by_setpoints:
-            self._begin()
-            return ()
-        self.phase = "starting"
-        return self._say(now, MavCommand.TAKEOFF, *[0.0] * 6, self._height)
+    # ---- who flies it
 
     def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
-        """Take note of a take-off, and ask to arm again for a while.
-
-        In this mode it may need what its checks did not ask for before, a position above all.
-        """
         if self.phase == "starting" and result == ACCEPTED:
             self._begin()
-        due, out = order.due, super()._answered(order, result, now)
-        if self.phase == "arming" and result != ACCEPTED and now < self._begun + PATIENCE:
-            order.sent, order.due = 0, due
-        return out
+        return super()._answered(order, result, now)
 
     def _begin(self) -> None:
-        self.phase, self._order = "flying", None
-        self.seen.told.append("taking off")
+        super()._begin()
         position = self.seen.position
         assert position is not None
         self._frame.home = position.alt - position.relative_alt
-        climb = 0.0 if self._rules.takes_off_by_setpoints else self._height / _SLOW_CLIMB
+        climb = 0.0 if self._by_setpoints else self._height / _SLOW_CLIMB
         self._sent_by = self._heard_at + PATIENCE + climb
 
-    # ---- what the vehicle does
-
-    def _on_current(self, current: MissionCurrent, now: float) -> None:
-        """It has a mission, which is not what is flown."""
-
-    def _on_disarmed(self) -> None:
-        if self.phase == "flying":
-            self._end("taken over", "disarmed in the middle of the flight")
-        super()._on_disarmed()
-
     def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
-        held = self.phase == "holding" and (mode == self._modes.hold or self._order is None)
-        match self.phase:
-            case "engaging" if mode == self._guided:
-                return self._arm(mode, now)
-            case "engaging" if mode not in self._asked:
-                self._step_aside()
-            case "ending" if mode == self._finish:
-                self._order = None
-                if not self._lands:
-                    self._over()
-            case "flying" | "holding" | "ending" if not held:
-                self._see_who_flies(mode, now)
-            case _:
-                return super()._on_mode(mode, now)
+        if mode in self._path:
+            self._unsure_since = None
+        super()._on_mode(mode, now)
+        if self.phase == "engaging" and mode == self._flown:
+            return self._go_on(now)
+        if self.phase == "ending" and mode == self._finish:
+            self._order = None
+            if not self._lands:
+                self._over()
         return ()
 
-    def _see_who_flies(self, mode: int, now: float) -> None:
+    def _on_another_mode(self, mode: int, now: float) -> None:
         """Step aside for somebody else; its failsafe for lost setpoints is told.
 
         In the mode of its failsafe it is that, if the mode that was asked for last is still the one
         for setpoints; while that is not known, nor is who flies it.
         """
+        led = self.phase in ("flying", "ending") or (self.phase == "holding" and self._order)
         wanted, since = self.seen.wanted, self._unsure_since
-        by_itself = self._rules.comes_back_from(mode, self._readiness.values)
+        by_itself = led and self._rules.comes_back_from(mode, self._readiness.values)
         if by_itself and wanted is None and (since is None or now <= since + _TOLD_BY):
             self._unsure_since = since or now
             return
         self._unsure_since = None
-        if by_itself and wanted is not None and wanted.intended_custom_mode == self._guided:
+        if by_itself and wanted is not None and wanted.intended_custom_mode == self._flown:
             if self.seen.told[-1] != _FAILSAFE:
                 self.seen.told.append(_FAILSAFE)
-        elif mode != self._guided and (self._armed or self.phase != "ending"):
+        elif self._armed or self.phase != "ending":
             self._step_aside()
 
     def _repeat(self, now: float) -> Sequence[Message]:
-        return () if self._unsure_since is not None else super()._repeat(now)
+        """Give the order; that to follow setpoints once these have come for long enough."""
+        waits = self.phase == "engaging" and self._by_setpoints
+        streamed = self._last_sent >= self._first_sent + _STREAMED * self._rules.streamed
+        unsure = self._unsure_since is not None or (waits and not streamed)
+        return () if unsure else super()._repeat(now)
 
     def _give_up(self, why: str, now: float) -> Sequence[Message]:
         """End the setpoints of an aircraft that cannot be led on: it is to hold."""
         self.seen.told.append(f"setpoints end: {why}")
-        if self.seen.custom_mode == self._guided:
+        if self.seen.custom_mode == self._flown:
             return self._ask_to_hold(now)
         self._step_aside()
         return ()
@@ -249,13 +217,10 @@ class Stream(Watch):
             what = f"home is {risen:+.0f} m higher now"
             self.seen.told.append(f"{what}: setpoints keep to that of the departure")
         out = list[Message]()
-        over = self.flight.part == "over" and self.seen.custom_mode == self._guided
+        over = self.flight.part == "over" and self.seen.custom_mode == self._flown
         if self.phase == "flying" and over:
-            self.phase = "ending"
+            self.phase, self._path = "ending", (self._flown, self._finish)
             out += self._set_mode(now, self._finish)
-        streamed = t >= self._first_sent + _STREAMED * self._rules.streamed
-        if self.phase == "engaging" and self._order is None and streamed:
-            out += self._set_mode(now, self._guided)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent, self._sent_by = t, now + PATIENCE
             self._first_sent = min(self._first_sent, t)
@@ -271,7 +236,7 @@ class Stream(Watch):
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""
         asked = self.phase == "ending" and self._order is not None
-        if self.phase == "flying" or (asked and self.seen.custom_mode == self._guided):
+        if self.phase == "flying" or (asked and self.seen.custom_mode == self._flown):
             if self._unsure_since is not None:
                 return None
             lead = self._held + self._clock.lead
@@ -280,6 +245,6 @@ class Stream(Watch):
             setpoint = self.flight.setpoint(t + lead, by_then, velocity)
             self.relay_start = self.flight.relay_start
             return setpoint
-        if self._rules.takes_off_by_setpoints and self.phase in ("engaging", "arming"):
+        if self._by_setpoints and self.phase in ("engaging", "arming"):
             return at_rest(place)
         return None

@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from faao_mav.fly.order import ACCEPTED, IN_PROGRESS, TRIES, Order
 from faao_mav.fly.preflight import Readiness
 from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.validate.rule import Finding
 from faao_mav.wire.machine import Machine, Progress
 from faao_mav.wire.messages import (
     CommandAck,
+    CommandLong,
     Envelope,
     Heartbeat,
     Message,
@@ -24,6 +25,13 @@ Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",
     "ending", "aside",
 ]  # fmt: skip
+
+_AGAIN, TRIES = 1.5, 5
+"""Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
+guide has it for missions."""
+
+ACCEPTED, _IN_PROGRESS = 0, 5
+"""MAV_RESULT."""
 
 _TICK, _REBOOT = 0.5, 1.5
 """Seconds between two looks at what is due, and in which a vehicle that is not armed any more can
@@ -41,6 +49,21 @@ _LISTEN = 2.0
 
 _WORDS = 1.0
 """Seconds for which what the vehicle says of an arming that it denies is waited for; chosen."""
+
+
+@dataclass(slots=True)
+class Order:
+    """A command that is repeated until it is carried out.
+
+    `due` is when it is sent next, s; `answer` is what became of it, in words.
+    """
+
+    command: MavCommand
+    params: tuple[float, ...]
+    due: float
+    sent: int = 0
+    refusals: int = 0
+    answer: str = "does not answer"
 
 
 class Watch(Machine[Ending]):
@@ -62,9 +85,11 @@ class Watch(Machine[Ending]):
     leaves a mission to the autopilot. What was armed, and did not start, is asked to disarm until
     it has.
 
-    The phases: "waiting" for others to start it, or "checking", "engaging" (a `Stream` only),
-    "arming" and "starting", or "disarming"; "flying"; "ending", when the mission is over;
-    "holding", as `cancel` asked for; "aside", when somebody else has the aircraft.
+    The phases: "waiting" for others to start it, or "checking", then those of its table of orders,
+    "engaging" (a `Stream` only), "arming" and "starting", or "disarming"; "flying"; "ending", when
+    the mission is over; "holding", as `cancel` asked for; "aside", when somebody else has the
+    aircraft. In each the vehicle's mode is one of `_path`, which it goes along: any other was set
+    by somebody else.
     """
 
     streams = False
@@ -93,13 +118,19 @@ class Watch(Machine[Ending]):
             self.phase = "checking"
         self.relay_start: float | None = None
         """When the plan's clock read 0, s on the vehicle's, where that is known."""
-        self._furthest, self._armed = 0, False
-        self._aside_since, self._disarmed_at = -math.inf, math.inf
+        self._flown = self._modes.mission
+        """The mode that flies it."""
+        self._starts: dict[Phase, tuple[MavCommand, tuple[float, ...]]] = {
+            "arming": (MavCommand.ARM, (1.0,)),
+            "starting": (MavCommand.START, ()),
+        }
+        """The orders that start it, one after the other."""
         self._order: Order | None = None
-        self._asked: set[int | None] = set()
-        """Modes in which it may be meanwhile: any other was set by somebody else."""
-        self._before = -1
-        self._begun, self._said_before, self._unattended = 0.0, 0, False
+        self._path: tuple[int, ...] = ()
+        """The modes of this phase, in the order in which they come; none: any."""
+        self._furthest, self._armed, self._unattended = 0, False, False
+        self._aside_since, self._disarmed_at = -math.inf, math.inf
+        self._begun, self._said_before = 0.0, 0
         self._then = Ending("refused", "")
 
     @property
@@ -161,18 +192,18 @@ class Watch(Machine[Ending]):
         order = self._order
         match message:
             case CommandAck(target, command, result) if self._peer.own.takes(target):
-                if order is not None and command == order.command and result != IN_PROGRESS:
+                if order is not None and command == order.command and result != _IN_PROGRESS:
                     return self._answered(order, result, now)
             case Heartbeat(armed=armed, custom_mode=mode):
-                disarms = self.phase == "disarming" and order is not None and not armed
                 # A first heartbeat may be from before the order.
-                if disarms and order is not None and (self._armed or order.sent > 1):
+                told = self._armed or (order is not None and order.sent > 1)
+                if self.phase == "disarming" and told and not armed:
                     self._end(self._then.kind, f"{self._then.text}; it is disarmed{self._words}")
                 if self._armed != armed:
                     self._disarmed_at = math.inf if armed else now
                 self._armed = armed
                 return self._on_mode(mode, now)
-            case MissionCurrent():
+            case MissionCurrent() if not self.streams:
                 self._on_current(message, now)
         return ()
 
@@ -205,35 +236,43 @@ class Watch(Machine[Ending]):
             self._over()
 
     def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
-        ordered = self.phase in ("arming", "starting", "disarming", "holding")
+        if self._path and mode not in self._path:
+            self._on_another_mode(mode, now)
+        elif self._path:
+            self._path = self._path[self._path.index(mode) :]
         match self.phase:
-            case _ if ordered and mode not in self._asked:
-                self._step_aside()
-            case "waiting" | "starting" if self._armed and mode == self._modes.mission:
+            case "waiting" | "starting" if (
+                self._armed and mode == self._modes.mission and not self.streams
+            ):
                 self._begin()
-            case "flying" if mode != self._modes.mission and self._furthest >= self._last:
-                self._over()  # the last item has a mode of its own, as PX4's return
-            case "flying" if mode != self._modes.mission:
-                self._aside_since = now
-                self._step_aside()
-            case "holding" if mode != self._before and self._order is not None:
-                self._asked.discard(self._before)  # the start that was asked for has come
-                if mode == self._modes.hold:
-                    self._order, self._asked, self.seen.patience = None, {mode}, PATIENCE
-                    self.seen.told.append("it holds; interrupt again to leave it")
+            case "holding" if self._path == (mode,) and self._order is not None:
+                self._order, self.seen.patience = None, PATIENCE
+                self.seen.told.append("it holds; interrupt again to leave it")
         return ()
+
+    def _on_another_mode(self, mode: int, now: float) -> None:  # noqa: ARG002
+        """Step aside for who set that; the last item has a mode of its own, as PX4's return."""
+        if self.phase == "flying" and self._furthest >= self._last:
+            self._over()
+            return
+        if self.phase == "flying":
+            self._aside_since = now
+        self._step_aside()
 
     def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
         """Go on, or end, now that an order is answered.
 
-        Arming that is denied is not asked for again: what is said about it is waited for.
+        Arming that is denied is not asked for again, but for setpoints, whose mode may need what
+        the checks did not ask for before: what is said about it is waited for.
         """
         order.answer = f"answers {order.command.name} with {command_result(result)}"
         accepted = result == ACCEPTED
         order.refusals += not accepted
         match self.phase:
             case "arming" if accepted:
-                return self._start(now)
+                return self._go_on(now)
+            case "arming" if self.streams and now < self._begun + PATIENCE:
+                order.sent = 0
             case "arming":
                 order.sent, order.due = TRIES, now + _WORDS
             case "starting" if not accepted:
@@ -243,8 +282,8 @@ class Watch(Machine[Ending]):
         return ()
 
     def _begin(self) -> None:
-        self.phase, self._order = "flying", None
-        self.seen.told.append("the mission is under way")
+        self.phase, self._order, self._path = "flying", None, (self._flown,)
+        self.seen.told.append("taking off" if self.streams else "the mission is under way")
 
     def _on_disarmed(self) -> None:
         match self.phase:
@@ -252,9 +291,10 @@ class Watch(Machine[Ending]):
                 self._end("refused", f"the vehicle disarmed before the mission began{self._words}")
             case "holding":
                 self._end("held", "disarmed after it was asked to hold")
-            case "flying" if self._furthest < self._last:
-                text = f"disarmed at item {self.seen.row}, before the end of the mission"
-                self._end("taken over", text)
+            case "flying" if self.streams or self._furthest < self._last:
+                where = f"at item {self.seen.row}, before the end of the mission"
+                where = "in the middle of the flight" if self.streams else where
+                self._end("taken over", f"disarmed {where}")
             case "flying" | "ending":
                 self._end("finished", "landed and disarmed at the end of the mission")
             case "aside":
@@ -262,7 +302,7 @@ class Watch(Machine[Ending]):
 
     def _over(self) -> None:
         """The mission is done; what is left is the landing, if there is one."""
-        self.phase = "ending"
+        self.phase, self._path = "ending", ()
         if not self._lands:
             self._end("finished", f"the mission is over; the vehicle is in mode {self.seen.mode}")
 
@@ -270,7 +310,7 @@ class Watch(Machine[Ending]):
         """Send nothing more."""
         if self.phase == "disarming":
             self._leave_armed(f"the pilot or a failsafe has it, in mode {self.seen.mode}")
-        self.phase, self._order, self.seen.patience = "aside", None, PATIENCE
+        self.phase, self._order, self._path, self.seen.patience = "aside", None, (), PATIENCE
         who = "the pilot or a failsafe has the aircraft; nothing more is sent"
         self.seen.told.append(f"mode {self.seen.mode}: {who}")
 
@@ -294,7 +334,12 @@ class Watch(Machine[Ending]):
         out = ready.settle(seen, now)
         if out is not None:
             return out
-        return () if self._stopped(ready) or ready.errors else self._set_out(now)
+        if self._stopped(ready) or ready.errors:
+            return ()
+        orders = f"arming, and starting {seen.items} items"
+        orders = "it is set to follow setpoints, then armed" if self.streams else orders
+        seen.told.append(f"its own checks pass: {orders}")
+        return self._go_on(now)
 
     def _lacks(self, now: float) -> str:  # noqa: ARG002
         """Return what it does not know that it has to, in words."""
@@ -312,25 +357,22 @@ class Watch(Machine[Ending]):
             self._end("contested" if contested else "refused", f"nothing was started: {told}")
         return bool(errors)
 
-    def _set_out(self, now: float) -> Sequence[Message]:
-        """Arm, now that nothing is against it."""
-        self.seen.told.append(f"its own checks pass: arming, and starting {self.seen.items} items")
-        return self._arm(self.seen.custom_mode, now)
-
-    def _arm(self, mode: int, now: float) -> Sequence[Message]:
-        self.phase, self._before, self._asked = "arming", mode, {mode}
-        return self._say(now, MavCommand.ARM, 1.0)
-
-    def _start(self, now: float) -> Sequence[Message]:
-        self.phase = "starting"
-        self._asked.add(self._modes.mission)
-        return self._say(now, MavCommand.START)
+    def _go_on(self, now: float) -> Sequence[Message]:
+        """Give the next of the orders that start it; after the last one it has begun."""
+        left = list(self._starts)
+        if self.phase in left:
+            del left[: left.index(self.phase) + 1]
+        if not left:
+            self._begin()
+            return ()
+        self.phase, mode = left[0], self.seen.custom_mode
+        self._path = (mode,) if self.phase == "arming" else (mode, self._flown)
+        command, params = self._starts[self.phase]
+        return self._say(now, command, *params)
 
     def _ask_to_hold(self, now: float) -> Sequence[Message]:
         """Ask the vehicle to hold, until it does."""
-        if self.phase != "starting" or self.streams:
-            self._before = -1
-        self._asked = {self._before, self._modes.mission, self._modes.hold}
+        self._path = (*self._path, self._modes.hold)
         self.phase, self.seen.patience = "holding", math.inf
         self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
         return self._set_mode(now, self._modes.hold)
@@ -352,9 +394,11 @@ class Watch(Machine[Ending]):
         if order.sent == TRIES and self.phase == "holding":
             text = f"it does not confirm that it holds, it {order.answer}: it is asked again"
             self.seen.told.append(f"{text} until then")
-        if order.sent >= TRIES and self.phase in ("engaging", "arming", "starting"):
+        if order.sent >= TRIES and self.phase in self._starts:
             return self._refused(order, now)
-        return [order.given(self._peer.address, now)]
+        again = min(order.sent, 255)
+        order.sent, order.due = order.sent + 1, now + _AGAIN
+        return [CommandLong(self._peer.address, order.command, again, *order.params)]
 
     # ---- how it ends
 
@@ -376,7 +420,7 @@ class Watch(Machine[Ending]):
     def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
         """Have it disarm, and end with `then`."""
         self.phase, self._then = "disarming", then
-        self._asked = {self.seen.custom_mode, self._modes.mission, self._modes.guided}
+        self._path = self.seen.custom_mode, self._flown
         self.seen.told.append(f"{then.text}: it is asked to disarm")
         return self._say(now, MavCommand.ARM, 0.0)
 
