@@ -86,8 +86,6 @@ def test_texts_that_are_no_plan() -> None:
     assert read_qgc_plan(whole).mission.items == (WAYPOINT,)
     for text, told in (
         ("", "line 1, column 1: not JSON"),
-        ("[" * 100_000, "nested too deep for a plan"),
-        ('{"a": ' * 100_000, "nested too deep for a plan"),
         ("9" * 5000, "a number of thousands of digits"),
         ('{"fileType": "Plan", "version": true}', "version: true; expected 1: open"),
         ('{"fileType": "Plan", "version": 1e400}', "version: inf; expected 1: open"),

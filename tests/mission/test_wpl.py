@@ -195,3 +195,7 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(MissionFileError, match=told):
             read_mission(path)
+    for deep in ("[", '{"a": '):
+        (tmp_path / "x.plan").write_text(deep * 100_000)
+        with pytest.raises(MissionFileError, match=r"x\.plan: nested too deep for a plan"):
+            read_mission(tmp_path / "x.plan")

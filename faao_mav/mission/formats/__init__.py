@@ -98,6 +98,8 @@ def naming(path: Path, work: Callable[[], Read]) -> Read:
         return work()
     except InputError as error:
         raise MissionFileError(f"{path}: {error}") from None
+    except RecursionError:
+        raise MissionFileError(f"{path}: nested too deep for a plan or a fence") from None
 
 
 def fence_path(mission: Path) -> Path | None:

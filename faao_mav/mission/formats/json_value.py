@@ -30,8 +30,6 @@ class Json:
         except json.JSONDecodeError as error:
             where = f"line {error.lineno}, column {error.colno}"
             raise MissionFileError(f"{where}: not JSON: {error.msg}") from None
-        except RecursionError:
-            raise MissionFileError("nested too deep for a plan or a fence") from None
         except ValueError:  # an integer of thousands of digits
             raise MissionFileError("a number of thousands of digits") from None
 
