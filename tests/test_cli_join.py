@@ -189,7 +189,7 @@ def test_parameters_beside_a_mission_say_whose_it_is_and_are_used(plan: Path, ou
     run(edit_plan(plan, {"vehicle.autopilot": "px4"}), "--out", out)
     beside, other = out.with_suffix(".params"), out.with_suffix(".param")
     told = run("validate", out).stdout
-    assert "for PX4 and a copter (as its parameters say)" in told
+    assert "for PX4 and a copter (as m.params beside it says)" in told
     assert f"parameters: {beside}, beside the mission" in told
     given = run("validate", out, "--parameters", beside).stdout
     assert "for PX4" in given

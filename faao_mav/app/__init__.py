@@ -2,5 +2,5 @@
 
 `document` and `scene` hold the plan that is edited, `planner` asks worker processes for `answers`,
 `vehicle` uploads, watches and debriefs beside it, `page` shows it all. Only `page`, its parts
-`panels`, `fly` and `map`, and `serve` know NiceGUI.
+`panels` and `fly`, and `serve` know NiceGUI.
 """

@@ -19,9 +19,6 @@ Step: TypeAlias = str | int
 Path: TypeAlias = tuple[Step, ...]
 """Keys and numbers of list entries from the top of a plan."""
 
-_MOST_UNDONE = 500
-"""Texts that undo goes back through. Chosen: a plan has 3,000 characters."""
-
 _INDENT = re.compile(r"^( +)[^\s#-]", re.MULTILINE)
 _BEFORE_DASH = re.compile(r"^( *)[^\s#-][^\n]*:[ ]*\n( *)- ", re.MULTILINE)
 """How far a text indents the keys of a section, and a list's dashes from the list's key."""
@@ -113,12 +110,8 @@ class Document:
             self.remove(path)
             return
         try:
-            value = YAML().load(text)
-        except (YAMLError, ValueError):
-            value = text
-        try:
-            self.put(path, value)
-        except PlanError:  # sound YAML that plans do not use, as aliases
+            self.put(path, YAML().load(text))
+        except (YAMLError, ValueError, PlanError):  # of sound YAML plans do not use all, as aliases
             self.put(path, text)
 
     def put(self, path: Path, value: object, gesture: object = None) -> None:
@@ -147,10 +140,8 @@ class Document:
         for step in path[:-1]:
             at = at[step]
         last: Any = path[-1]
-        if isinstance(at, list):
+        if isinstance(at, list) or last in at:
             del at[last]
-        else:
-            at.pop(last, None)
         self._keep(data, yaml, None)
 
     def replace(self, text: str, source: str) -> None:
@@ -193,8 +184,8 @@ class Document:
         again = gesture is not None and gesture == self._gesture
         _parsed(text.getvalue(), self.source)
         kept = self._texts[: self._at if again else self._at + 1]
-        self._texts = [*kept, text.getvalue()][-_MOST_UNDONE:]
-        self._at, self._gesture = len(self._texts) - 1, gesture
+        self._texts = [*kept, text.getvalue()]
+        self._at, self._gesture = len(kept), gesture
 
 
 def _read(path: File) -> str:

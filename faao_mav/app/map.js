@@ -97,9 +97,9 @@ export default {
       if (this.dragging) return;
       const focused = document.activeElement?.title;
       this.marks.clearLayers();
-      for (const { key, kind, label, at } of stations) {
+      for (const { key, label, at } of stations) {
         const moved = (to, done) => this.tell("moved", { key, at: pair(to), done });
-        this.draggable(at, kind, label, label, moved).addTo(this.marks);
+        this.draggable(at, key, label, label, moved).addTo(this.marks);
       }
       if (focused) this.$el.querySelector(`[title="${CSS.escape(focused)}"]`)?.focus();
       this.shapes = zones;

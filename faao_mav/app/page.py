@@ -7,6 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import nicegui
 import numpy as np
 from nicegui import events, ui
 
@@ -15,7 +16,6 @@ from faao_mav.app.charts import heights
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.fly import Fly
 from faao_mav.app.guard import TILES
-from faao_mav.app.map import PlannerMap
 from faao_mav.app.panels import Form, Results, fields
 from faao_mav.app.planner import Planner
 from faao_mav.app.scene import STATIONS, Scene
@@ -40,6 +40,22 @@ _STATES = {
     "failed": "no flight",
 }
 """What the page says of the answer that it shows."""
+
+
+_LEAFLET = Path(nicegui.__file__).parent / "elements" / "leaflet" / "dist"
+"""Leaflet as NiceGUI brings it along."""
+
+
+class PlannerMap(ui.element, component="map.js", esm={"nicegui-leaflet": str(_LEAFLET)}):
+    """Leaflet with the plan's stations, ends, zones and flight; what it does is in map.js.
+
+    Events: `ready`; `moved` (key, at, done); `zone` (key, inclusion, corners or center and radius,
+    done); `removed` (key); `cursor` (at). Methods by `run_method`: those of map.js.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.add_resource(_LEAFLET)
 
 
 class Page:

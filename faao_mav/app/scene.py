@@ -1,7 +1,6 @@
 """What of a plan's text is on the map: stations, ends and zones, and what dragging them writes."""
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 from faao_mav.app.document import Document, Path
@@ -14,7 +13,10 @@ STATIONS: dict[str, tuple[Path, str]] = {
     "start": (("flight", "start"), "Start"),
     "end": (("flight", "end"), "End"),
 }
-"""Path and name of what stands on the map, by its kind."""
+"""Path and name of what stands on the map, by its key."""
+
+_ZONES = ("inclusion", "exclusion")
+"""The lists of a fence. The key of a zone is the name of its list and its number there."""
 
 _METRES, _DEGREES = 2, 8
 """Decimals that dragging writes: 1 cm, and 1 mm in degrees. Chosen."""
@@ -23,7 +25,7 @@ _METRES, _DEGREES = 2, 8
 class Scene:
     """The places in a document that may not be a sound plan; those that are no places are left out.
 
-    `frame` is None where the document has no sound origin: then nothing is on the map.
+    `frame` is None where the document has no sound origin: then nothing can be moved.
     """
 
     def __init__(self, document: Document) -> None:
@@ -36,121 +38,103 @@ class Scene:
             return
 
     def stations(self) -> list[dict[str, Any]]:
-        """Return kind, name, key and [latitude, longitude] of stations and ends."""
-        places = ((kind, name, self.degrees(self._document.value(path)))
-                  for kind, (path, name) in STATIONS.items())  # fmt: skip
+        """Return key, name and [latitude, longitude] of stations and ends."""
         return [
-            {"key": kind, "kind": kind, "label": name, "at": at} for kind, name, at in places if at
+            {"key": key, "label": name, "at": at}
+            for key, (path, name) in STATIONS.items()
+            if (at := self._degrees(self._document.value(path)))
         ]
 
     def zones(self) -> list[dict[str, Any]]:
         """Return the zones of the fence: key, inclusion, and corners or center and radius."""
         found = []
-        for path, inclusion, value in self._listed():
-            zone = {"key": "/".join(map(str, path)), "inclusion": inclusion}
-            held = value if isinstance(value, dict) else {"polygon": value}
-            if "polygon" in held:
-                ring = held["polygon"] if isinstance(held["polygon"], list) else []
-                corners = [self.degrees(each) for each in ring]
+        for name in _ZONES:
+            for k, value in enumerate(self._zones(name)):
+                held = value if isinstance(value, dict) else {"polygon": value}
+                zone = {"key": f"{name}/{k}", "inclusion": name == "inclusion"}
+                ring, at = held.get("polygon"), self._degrees(held.get("center"))
+                corners = [self._degrees(each) for each in ring] if isinstance(ring, list) else []
+                radius = held.get("radius")
                 if len(corners) > 2 and all(corners):
                     found.append(zone | {"corners": corners})
-                continue
-            at, radius = self.degrees(held.get("center")), held.get("radius")
-            if at and isinstance(radius, int | float) and 0 < radius < math.inf:
-                found.append(zone | {"center": at, "radius": radius})
+                elif at and isinstance(radius, int | float) and 0 < radius < math.inf:
+                    found.append(zone | {"center": at, "radius": radius})
         return found
 
-    def move(self, kind: str, at: list[float], gesture: object) -> None:
-        """Write the place of a station or end, where there is an origin to count from."""
+    def move(self, key: str, at: list[float], gesture: object) -> None:
+        """Write the place of a station or end: in degrees where it is so already, else in metres.
+
+        Nothing is written where there is no origin to count from.
+        """
+        path, _ = STATIONS[key]
         if self.frame is None:
             return
-        path = STATIONS[kind][0]
-        self._document.put(path, self._as_before(path, at), gesture)
+        place: object = self._metres(at)
+        if isinstance(self._document.value(path), dict):
+            latitude, longitude = (round(x, _DEGREES) for x in at)
+            place = {"latitude": latitude, "longitude": longitude}
+        self._document.put(path, place, gesture)
 
     def change(self, told: dict[str, Any], gesture: object) -> None:
         """Write a zone that was moved, or with the key None a new one.
 
         A zone that is no longer there, undone while it was dragged, stays away.
         """
-        if self.frame is None or not (told["key"] is None or self._has(told["key"])):
-            return
         name = "inclusion" if told["inclusion"] else "exclusion"
-        value: Any
+        path, zones = ("fence", name), self._zones(name)
+        k = len(zones) if told["key"] is None else self._number(told["key"])
+        if self.frame is None or k is None:
+            return
+        value: dict[str, Any]
         if told.get("center"):
             value = {"center": self._metres(told["center"]), "radius": round(told["radius"], 2)}
         else:
             value = {"polygon": [self._metres(each) for each in told["corners"]]}
-        path: Path = ("fence", name)
-        if told["key"] is not None:
-            path = _path(told["key"])
-            old = self._document.value(path)
-            self._document.put(path, value["polygon"] if isinstance(old, list) else value, gesture)
-            return
-        held = self._document.value(path)
-        zones = held if isinstance(held, list) else []
-        if path == ("fence", "inclusion") and zones and not self._are_zones(zones):
-            zones = [{"polygon": zones}]  # the short form holds one polygon only
-        if zones and zones == held:
-            self._document.put((*path, len(zones)), value)
-        else:
-            self._document.put(path, [*zones, value])
+        if zones and zones == self._document.value(path):
+            self._document.put((*path, k), value, gesture)
+        elif k < len(zones):
+            self._document.put(path, value["polygon"], gesture)
+        else:  # the short form holds one polygon only
+            rings = [{"polygon": ring} for ring in zones]
+            self._document.put(path, [*rings, value], gesture)
 
     def remove(self, key: str) -> None:
         """Take a zone out, if it is there, and the whole fence with its last."""
-        if not self._has(key):
+        if (k := self._number(key)) is None:
             return
-        path = _path(key)
-        rest = [each for each, _, _ in self._listed() if each != path]
-        if not rest and self._document.value(("fence", "file")) is None:
-            path = ("fence",)
-        elif not any(each[:2] == path[:2] for each in rest):
-            path = path[:2]
+        name = key.partition("/")[0]
+        path: Path = ("fence", name, k)
+        if len(self._zones(name)) == 1:
+            last = sum(len(self._zones(each)) for each in _ZONES) == 1
+            path = path[:1] if last and not self._document.value(("fence", "file")) else path[:2]
         self._document.remove(path)
 
-    def degrees(self, value: object) -> list[float] | None:
+    def _zones(self, name: str) -> list[Any]:
+        """Return the zones of a list; its short form is the corners of the only one."""
+        value = self._document.value(("fence", name))
+        if not isinstance(value, list) or not value:
+            return []
+        listed = any(isinstance(each, dict) and "latitude" not in each for each in value)
+        return value if listed else [value]
+
+    def _number(self, key: str) -> int | None:
+        """Return the number of the zone in its list; None where it is no longer there."""
+        name, _, k = key.partition("/")
+        return int(k) if int(k) < len(self._zones(name)) else None
+
+    def _degrees(self, value: object) -> list[float] | None:
         """Return [latitude, longitude] of a position as a plan writes it; None if it is none."""
         try:
             if isinstance(value, dict):
                 return [float(value["latitude"]), float(value["longitude"])]
             if isinstance(value, list) and self.frame is not None:
                 east, north = map(float, value)
-                latitude, longitude = self.frame.to_geodetic((east, north))
-                found = [float(latitude), float(longitude)]
+                found = [float(x) for x in self.frame.to_geodetic((east, north))]
                 return found if all(map(math.isfinite, found)) else None
         except (KeyError, TypeError, ValueError):
             return None
         return None
 
-    def _as_before(self, path: Path, at: list[float]) -> object:
-        """Return a place in degrees where the document has it so, else in metres."""
-        if isinstance(self._document.value(path), dict):
-            return dict(
-                zip(("latitude", "longitude"), (round(x, _DEGREES) for x in at), strict=True)
-            )
-        return self._metres(at)
-
     def _metres(self, at: list[float]) -> list[float]:
         assert self.frame is not None
         return [round(x, _METRES) + 0.0 for x in self.frame.to_local(*at).tolist()]
-
-    def _has(self, key: str) -> bool:
-        return any(path == _path(key) for path, _, _ in self._listed())
-
-    def _listed(self) -> Iterator[tuple[Path, bool, Any]]:
-        for name in ("inclusion", "exclusion"):
-            value = self._document.value(("fence", name))
-            if not isinstance(value, list) or not value or self.frame is None:
-                continue
-            if self._are_zones(value):
-                for k, zone in enumerate(value):
-                    yield ("fence", name, k), name == "inclusion", zone
-            else:
-                yield ("fence", name), name == "inclusion", value
-
-    @staticmethod
-    def _are_zones(value: list[Any]) -> bool:
-        return any(isinstance(each, dict) and "latitude" not in each for each in value)
-
-
-def _path(key: str) -> Path:
-    return tuple(int(step) if step.isdigit() else step for step in key.split("/"))

@@ -3,16 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from faao_mav.autopilot import (
-    Autopilot,
-    Kind,
-    Vehicle,
-    autopilots,
-    family,
-    kind_by_number,
-    kinds,
-)
-from faao_mav.autopilot.files import autopilot_of, parameter_path, vehicle_in
+from faao_mav.autopilot import Autopilot, Kind, Vehicle, autopilots, family, kinds
+from faao_mav.autopilot.files import MadeFor, autopilot_of, made_for, parameter_path
 from faao_mav.errors import InputError
 from faao_mav.mission.formats.parameter_file import read_parameters
 
@@ -36,55 +28,44 @@ def choose_vehicle(
     say whose it is, and for a mission of a type of vehicle that is unknown here.
     """
     autopilot, kind, parameters = asked
+    planned = plan.aircraft if plan is not None else None
+    told = made_for(mission_file, file, planned)
     given = read_parameters(parameters) if parameters is not None else None
-    if plan is not None:
-        base, chosen_by = plan.aircraft, "as the plan says"
-    elif (named := vehicle_in(file)) is not None:
-        base, chosen_by = named, "as the file says"
-    else:
-        base, chosen_by = _by_parameters(mission_file, file, given, asked)
-    if autopilot is not None or kind is not None:
-        chosen_by = "as asked"
-    whose = autopilot or base.autopilot
-    values, source = base.parameters if whose == base.autopilot else {}, base.source
-    beside = parameter_path(mission_file, whose)
-    if given is not None:
-        values, source = given, str(parameters)
-    elif beside.is_file():
-        given, parameters = read_parameters(beside), beside
-        values, source = {**values, **given}, f"{beside}, beside the mission"
-    theirs = autopilot_of(given) if given is not None else None
-    if theirs is not None and theirs != whose:
-        raise InputError(
-            f"{parameters}: parameters of {family(theirs).name}, but the mission is for "
-            f"{family(whose).name} ({chosen_by}): "
-            f"give the vehicle's own (--parameters), or --autopilot {theirs}"
-        )
-    body = base.body if (whose, kind or base.kind) == (base.autopilot, base.kind) else None
-    return Vehicle(whose, kind or base.kind, values, source, body), chosen_by
-
-
-def _by_parameters(
-    mission_file: Path,
-    file: "MissionFile",
-    given: dict[str, float] | None,
-    asked: tuple[Autopilot | None, Kind | None, Path | None],
-) -> tuple[Vehicle, str]:
-    """Return the vehicle of the parameters `given` or beside the mission, and what told it."""
-    autopilot, kind, _ = asked
-    if file.vehicle_type and kind is None and kind_by_number(file.vehicle_type) is None:
+    if kind is None and told.kind is not None and told.kind not in kinds():
         raise InputError(
             f"{mission_file}: vehicleType {file.vehicle_type} (a MAV_TYPE) is not supported; "
             f"--type {' or --type '.join(kinds())} says as which the mission is to be judged"
         )
-    beside = {each: parameter_path(mission_file, each) for each in autopilots()}
-    found = [each for each, path in beside.items() if path.is_file()]
-    if given is None and len(found) > 1 and autopilot is None:
+    theirs = autopilot_of(given or ())
+    if planned is None and theirs is not None and (file.firmware is None or not told.autopilot):
+        told = MadeFor(theirs, told.kind, "as its parameters say")
+    whose, by = autopilot or told.autopilot, told.by
+    if whose is None:
+        found = {each: parameter_path(mission_file, each) for each in autopilots()}
+        beside = [each for each, path in found.items() if given is None and path.is_file()]
+        if len(beside) > 1:
+            raise InputError(
+                f"{' and '.join(str(found[each]) for each in beside)}: only one of them can belong "
+                f"to {mission_file}: remove the other, or give --autopilot"
+            )
+        whose, by = Vehicle().autopilot, "by default; --autopilot and --type say otherwise"
+        if beside:
+            whose, by = beside[0], f"as {found[beside[0]].name} beside it says"
+    if autopilot is not None or kind is not None:
+        by = "as asked"
+    base = planned if planned is not None and planned.autopilot == whose else Vehicle(whose)
+    values, source = base.parameters, base.source
+    if given is not None:
+        values, source = given, str(parameters)
+    elif (parameters := parameter_path(mission_file, whose)).is_file():
+        given = read_parameters(parameters)
+        values, source = {**values, **given}, f"{parameters}, beside the mission"
+        theirs = autopilot_of(given)
+    if theirs not in (None, whose):
         raise InputError(
-            f"{' and '.join(str(beside[each]) for each in found)}: only one of them can belong to "
-            f"{mission_file}: remove the other, or give --autopilot"
+            f"{parameters}: parameters of {family(theirs).name}, but the mission is for "
+            f"{family(whose).name} ({by}): give the vehicle's own (--parameters), or --autopilot "
+            f"{theirs}"
         )
-    theirs = autopilot_of(given) if given is not None else found[0] if len(found) == 1 else None
-    if theirs is not None:
-        return Vehicle(theirs), "as its parameters say"
-    return Vehicle(), "by default; --autopilot and --type say otherwise"
+    kind = kind or told.kind or base.kind
+    return Vehicle(whose, kind, values, source, base.body if kind == base.kind else None), by

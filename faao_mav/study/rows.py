@@ -27,9 +27,6 @@ _BEGINNING = b'{"key": "'
 MAX_BYTES = 100_000_000
 """Bytes of the rows of a study that are read; chosen: 9,000 flights of 600 slots."""
 
-_MAX_LINE = 4_000_000
-"""Bytes of the longest row; chosen: a flight of 100,000 slots has 2,400,000."""
-
 
 def _route(pairs: object) -> Real:
     """Return `pairs` of metres as an array (n, 2)."""
@@ -143,15 +140,11 @@ def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ..
 def _row(line: bytes, where: str) -> StudyRow:
     """Return the row in a line of the file, without its values: the case has them."""
     try:
-        if len(line) > _MAX_LINE:
-            raise ValueError(f"more than {_MAX_LINE:,} bytes")
         return replace(_adapter().validate_json(line), values={})
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         told = f"{place_of(first['loc'])}: {first['msg']}".removeprefix(": ")
-    except ValueError as error:
-        told = str(error)
-    raise InputError(f"{where}: no row of a study: {told}; give another directory")
+        raise InputError(f"{where}: no row of a study: {told}; give another directory") from None
 
 
 @cache

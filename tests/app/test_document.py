@@ -119,18 +119,18 @@ def test_zones_are_drawn_changed_and_removed() -> None:
     assert [zone.inclusion for zone in plan.zones] == [True, False]
     assert document.value(("fence", "exclusion")) == [{"center": [20.0, 30.0], "radius": 4.0}]
     shown = scene.zones()
-    assert [zone["key"] for zone in shown] == ["fence/inclusion/0", "fence/exclusion/0"]
+    assert [zone["key"] for zone in shown] == ["inclusion/0", "exclusion/0"]
     scene.change({**shown[1], "radius": 7.0}, None)
     assert document.value(("fence", "exclusion", 0, "radius")) == 7.0
-    scene.remove("fence/inclusion/0")
+    scene.remove("inclusion/0")
     assert document.value(("fence", "inclusion")) is None
-    scene.remove("fence/exclusion/0")
+    scene.remove("exclusion/0")
     assert document.value(("fence",)) is None
     for _ in range(5):
         document.undo()
     assert document.text == SMALL
     # what was dragged or chosen when it was undone is not there any more
-    for key in ("fence/inclusion/0", "fence/exclusion/7"):
+    for key in ("inclusion/0", "exclusion/7"):
         scene.change({**shown[1], "key": key}, None)
         scene.remove(key)
     assert document.text == SMALL
@@ -149,7 +149,7 @@ def test_the_short_form_of_an_inclusion_becomes_a_list_with_a_second_one() -> No
     document = Document((MISSIONS / "fenced_relay.yaml").read_text())
     scene = Scene(document)
     (first, *_) = scene.zones()
-    assert first["key"] == "fence/inclusion"
+    assert first["key"] == "inclusion/0"
     scene.change(first, None)
     assert len(document.value(("fence", "inclusion"))) == 4
     scene.change({**first, "key": None}, None)
