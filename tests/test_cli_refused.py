@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from conftest import FLYABLE, edited
+from conftest import FLYABLE, MISSIONS, edited
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
@@ -24,6 +24,9 @@ plan.yaml --method magic | optimizer.method: 'magic' is not accepted; give direc
 plan.yaml --method algorithm1 | radio.fading: ergodic is not for algorithm1
 bad.yaml --out m.txt | bad.yaml: flight.altitude: -1
 useless.yaml --out m.txt --save r.npz | vehicle.parameters: WPNAV_JERK: 0
+useless_plane.yaml | AIRSPEED_MIN
+beyond.yaml --out m.txt | max_speed: 22 m/s; ArduCopter keeps plans of at most 20 m/s (the most
+beyond.yaml --upload {NOWHERE} | 5 m/s^2 (WP_ACC); give that or less, or --force to make the
 plan.yaml --nonsense | No such option
 plan.yaml second.yaml | unexpected extra argument
 plan.yaml --out plan.yaml | '.yaml'; expected a name that ends in
@@ -86,6 +89,11 @@ def test_what_cannot_be_done_is_said_before_the_work(
     Path("bad.yaml").write_text(edited(FLYABLE, {"flight.altitude": -1}))
     useless = {"vehicle.parameters": {"WPNAV_JERK": 0}}
     Path("useless.yaml").write_text(edited(FLYABLE, useless))
+    useless = {"vehicle.parameters": {"AIRSPEED_MIN": -1}}
+    plane = (MISSIONS / "plane_relay.yaml").read_text()
+    Path("useless_plane.yaml").write_text(edited(plane, useless))
+    beyond = {"vehicle.max_speed": 22, "vehicle.max_acceleration": 5.5}
+    Path("beyond.yaml").write_text(edited(FLYABLE, beyond))
     shutil.copy(DATA / "missions" / "two_current.waypoints", "two_current.waypoints")
     shutil.copy(DATA / "missions" / "plain.waypoints", "m.waypoints")
     shutil.copy(DATA / "logs" / "arducopter.tlog", "log.tlog")
