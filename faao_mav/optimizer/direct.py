@@ -36,6 +36,7 @@ from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_starts, stretched
 from faao_mav.optimizer.search.sparing import sparing_starts
 from faao_mav.optimizer.search.starts import by_name, starts
+from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
@@ -173,7 +174,7 @@ def _routes(
         routes["cutoff"] = before.trajectory
     if known is not None:
         calm = (*constraints_of(kin), *fenced)
-        near = feasible(kin, next(iter(routes.values())), stretched(kin, known), calm)
+        near = feasible(kin, next(iter(routes.values())), _in_time(problem, known), calm)
         routes = {"known": near} if alone else routes | {"known": near}
     if problem.energy < np.inf:
         kept = problem.constraints(kin)
@@ -181,6 +182,21 @@ def _routes(
         if not routes:
             raise InfeasibleError("no flight was found that takes so little energy")
     return routes
+
+
+def _in_time(problem: Problem, flight: Trajectory) -> Real:
+    """Return velocities (n, 2) at which the path of `flight` takes the time of `problem`.
+
+    With a least speed they are those of the nearest flight that has it, if one is found.
+    """
+    kin = problem.kinematics
+    slower = stretched(kin, flight)
+    if kin.min_speed == 0:
+        return slower
+    then, now = (np.linspace(0, 1, n) for n in (kin.slots, len(flight.w)))
+    path = np.stack([np.interp(then, now, w) for w in flight.w.T], axis=1)
+    near = nearest_flight(kin, path, kin.follow(slower), problem.constraints(kin))
+    return slower if near is None else near.v
 
 
 def _positions(flights: Sequence[Trajectory]) -> Real:

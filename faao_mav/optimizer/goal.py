@@ -1,25 +1,29 @@
-"""The least duration, power or energy that delivers what a plan's `goal` asks for.
+"""Goals: the least duration, power or energy that delivers so much, the most data of an energy.
 
 The searches rest on what is delivered growing with each. A flight at the speeds v(t / c) / c
 takes c times as long along the same path: with c > 1 it keeps the limits, with ends that hover or
 are free, and its rates have the same means, so that R_del never falls as T grows and T R_del rises
-with it. A precoder that keeps a power limit keeps a larger one, and so does a flight
-with a limit on its energy. Each step is a whole optimisation, which has the last flight among its
-starts; for an energy it is a search for the best duration: see `most_data`. Where the growth is not
-certain (known draws, which change with T; wind; a least speed; a buffer that fills), the answer
-still meets the goal and one step less was found not to, but a smaller one may meet it.
+with it. A precoder that keeps a power limit keeps a larger one, and so does a flight with a limit
+on its energy. Where the growth is not certain (known draws, which change with T; wind; a least
+speed; a buffer that fills), the answer still meets the goal and one step less was found not to, but
+a smaller one may meet it.
+
+The data that an energy E lets be delivered rise along T while there is energy to spare, and fall
+where it is short, to nothing at E = T min P: a search over T finds their maximum. Energies are
+those of flight and relay, J.
 """
 
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+
+import numpy as np
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.direct import direct
-from faao_mav.optimizer.most_data import WithinEnergy
 from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.solution import Least, Observer, Solution, staged
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
@@ -38,12 +42,26 @@ Chosen: models of power are less true than that."""
 _BITS_PER_DB = math.log2(10) / 10
 """What a link gains of a dB where it is not saturated, bit/s/Hz: the most that capacity gains."""
 
+_PRECISION = 0.01
+"""The share of the longest duration to which that of most data is looked for. Chosen."""
 
-def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
-    """Return the solution of `plan` with the least duration, powers or energy that meet its `goal`.
+_NEAR = 0.15
+"""The share by which durations are tried on both sides of that of a near energy. Chosen."""
 
-    The solution has them; `Solution.least` tells how they were found. Raises
-    `InfeasibleError` where the goal is out of reach, with what the limits let be delivered.
+_COMPARED = 50
+"""Durations of straight flights among which the thriftiest is looked for, and a tenth of airspeeds.
+Chosen."""
+
+_ABOVE = 1e-4
+"""The share by which an energy is above what a flight takes that is a start. Chosen: ten times what
+the search leaves unused."""
+
+
+def reach_goal(plan: Plan, *, observe: Observer | None = None) -> Solution:
+    """Return the solution of `plan` with the least or the best quantity that its `goal` asks for.
+
+    `Solution.least` tells how it was found. Raises `InfeasibleError` where the goal is out of
+    reach, with what the limits let be delivered.
 
     >>> from faao_mav.plan import parse_plan
     >>> plan = parse_plan('''
@@ -57,162 +75,200 @@ def least(plan: Plan, *, observe: Observer | None = None) -> Solution:
     ...   relay: {power_dbm: 0}
     ...   ground_user: {position: [60, 60]}
     ... ''')
-    >>> found = least(plan)
+    >>> found = reach_goal(plan)
     >>> found.plan.flight.duration, found.delivered_rate >= 0.6
     (10.0, True)
     >>> found.least.below.plan.flight.duration, found.least.below.delivered_rate < 0.6
     (9.5, True)
     """
-    kinds = {"duration": _durations, "power": _powers, "energy": _energies}
-    steps = kinds[plan.goal.minimise or ""](plan, observe)
-    solved = {steps.high: steps.at(steps.high, None)}
-    first = steps.first(solved[steps.high])
+    flights = _Flights(plan, observe)
+    if plan.goal.energy_wh is not None:
+        best = flights.ended(flights.within(JOULES_PER_WH * plan.goal.energy_wh))
+        return replace(best, least=Least(plan.flight.duration, None, flights.count))
+    most = flights.surplus(flights.whole)
+    less = most - flights.data(flights.whole)
+    if most < 0:
+        raise InfeasibleError(_out_of_reach(plan, flights.whole))
+    # whole numbers from one at which nothing is delivered to that of the plan as it is
+    at: Callable[[int], Solution]
+    if plan.goal.minimise == "duration":
+        limit, at = plan.flight.duration, flights.lasting
+        low, high = fewest_slots(plan) - 1, plan.flight.slots
+    elif plan.goal.minimise == "power":
+        limit, at = dbm(plan.powers[0]), flights.stronger
+        low, high = -math.ceil((dbm(min(plan.powers)) - MIN_DBM) / POWER_STEP), 0
+        less = low * POWER_STEP * _BITS_PER_DB
+    else:
+        limit, at = flights.taken / JOULES_PER_WH, flights.of_share
+        low, high = 0, round(1 / ENERGY_SHARE)
+    solved = {high: flights.whole}
 
     def surplus(number: int) -> float:
-        if number not in solved:
-            known = next(reversed(solved.values()))
-            with suppress(InfeasibleError):
-                solved[number] = steps.at(number, known)
-        return _surplus(solved[number]) if number in solved else -math.inf
+        with suppress(InfeasibleError):
+            solved[number] = at(number)
+        return flights.surplus(solved[number]) if number in solved else -math.inf
 
-    if surplus(steps.high) < 0:
-        raise InfeasibleError(_out_of_reach(plan, solved[steps.high]))
-    number = least_number(surplus, steps.low, steps.high, first)
-    best, below = steps.ended(number, solved[number]), solved.get(number - 1)
-    return replace(best, least=Least(steps.limit, below, steps.optimizations()))
+    number = least_number(surplus, low, high, less, most)
+    best, below = flights.ended(solved[number]), solved.get(number - 1)
+    return replace(best, least=Least(limit, below, flights.count))
 
 
-def least_number(surplus: Callable[[int], float], low: int, high: int, guess: int) -> int:
+def least_number(
+    surplus: Callable[[int], float], low: int, high: int, less: float, more: float
+) -> int:
     """Return the least number above `low` whose `surplus`, which grows, is not negative.
 
-    It is known not to be at `high`; -inf stands for a number without a flight. `guess` is tried
-    first. Then numbers are roots of chords; where the same end moves again the value of the other
-    is halved (the Illinois rule).
+    `less` < 0 and `more` >= 0 are those of `low` and `high`; -inf stands for a number without a
+    flight. Numbers are roots of chords; where the same end moves again the value of the other is
+    halved (the Illinois rule).
 
-    >>> least_number(lambda n: n**2 - 200.0, 0, 1000, 500)
+    >>> least_number(lambda n: n**2 - 200.0, 0, 1000, -200.0, 999800.0)
     15
     """
-    less, more, moved = -math.inf, surplus(high), 0
-    beyond = (high, more)  # the last number above `high`
+    moved = 0
     while high - low > 1:
+        guess = (low + high) // 2
+        if math.isfinite(less):
+            guess = math.ceil(low - less / (more - less) * (high - low))
         number = min(max(guess, low + 1), high - 1)
         value = surplus(number)
         if value >= 0:
-            beyond, high, more = (high, more), number, value
-            less, moved = (less / 2 if moved == 1 else less), 1
+            high, more, less, moved = number, value, less / (2 if moved == 1 else 1), 1
         else:
-            low, less = number, value
-            more, moved = (more / 2 if moved == -1 else more), -1
-        if math.isfinite(less):
-            guess = math.ceil(low - less / (more - less) * (high - low))
-        elif beyond[0] > high and beyond[1] > more:
-            root = high - more * (beyond[0] - high) / (beyond[1] - more)
-            guess = max(math.ceil(root), (3 * low + high) // 4)
-        else:
-            guess = (low + high) // 2
+            low, less, more, moved = number, value, more / (2 if moved == -1 else 1), -1
     return high
 
 
-@dataclass(frozen=True)
-class _Steps:
-    """Plans by a whole number: at `high` the one that was given, at `low` none that meets the goal.
+class _Flights:
+    """Optimised flights of `plan` and of plans like it.
 
-    `limit` is the quantity of the plan that is minimised, `at` optimises at a number, from the
-    flight of a near one, `first` is the first guess, `ended` the answer from all starts.
+    `whole` is that of the plan without a limit on the energy, `taken` what it takes, J, or infinite
+    without a model; `last` the last one, `count` how many were optimised.
     """
 
-    low: int
-    high: int
-    limit: float
-    at: Callable[[int, Solution | None], Solution]
-    first: Callable[[Solution], int]
-    ended: Callable[[int, Solution], Solution]
-    optimizations: Callable[[], int]
+    def __init__(self, plan: Plan, observe: Observer | None) -> None:
+        self.plan, self.observe, self.count = plan, observe, 0
+        self.last: Solution | None = None
+        self.whole = self.last = self.changed({})
+        taken = self.whole.problem.energy_of(self.whole.trajectory)
+        self.taken = math.inf if taken is None else taken
 
+    def data(self, found: Solution) -> float:
+        """Return what `found` delivers, bit/Hz per slot, or where a rate is asked for that."""
+        return found.delivered_rate * (len(found.w) if self.plan.goal.rate is None else 1)
 
-def _surplus(found: Solution) -> float:
-    return found.plan.flight.slots * (found.delivered_rate - found.plan.needed_rate)
+    def surplus(self, found: Solution) -> float:
+        """Return by how much that is above what is asked for."""
+        needed = found.plan.needed_rate * (len(found.w) if self.plan.goal.rate is None else 1)
+        return self.data(found) - needed
 
+    def changed(
+        self, changes: dict[str, float], energy: float = math.inf, *, alone: bool = False
+    ) -> Solution:
+        """Return the flight with `changes` by key, within `energy`, with `last` among its starts.
 
-def _of_plans(
-    plan: Plan,
-    observe: Observer | None,
-    low: int,
-    high: int,
-    limit: float,
-    changes: Callable[[int], dict[str, Any]],
-    first: Callable[[Solution], int],
-) -> _Steps:
-    """Return the steps of plans with `changes` by dotted keys."""
-    count = 0
-
-    def at(number: int, known: Solution | None) -> Solution:
-        nonlocal count
-        count += 1
-        told = ", ".join(f"{key} {value:g}" for key, value in changes(number).items())
-        return direct(
-            build_problem(plan.changed(changes(number))),
-            observe=staged(observe, told),
-            known=None if known is None else known.trajectory,
+        With `alone` there is no other start.
+        """
+        told = ", ".join(f"{key} {value:g}" for key, value in changes.items()) or "as given"
+        if energy < math.inf:
+            told += f" within {energy / JOULES_PER_WH:.4g} Wh"
+        self.count += 1
+        self.last = direct(
+            replace(build_problem(self.plan.changed(changes)), energy=energy),
+            observe=staged(self.observe, told),
+            known=None if self.last is None else self.last.trajectory,
+            alone=alone,
         )
+        return self.last
 
-    return _Steps(low, high, limit, at, first, lambda _, found: found, lambda: count)
+    def lasting(self, slots: int, energy: float = math.inf, *, alone: bool = False) -> Solution:
+        """Return the flight of so many `slots`: see `changed`."""
+        duration = round(slots * self.plan.flight.time_step, 9)
+        return self.changed({"flight.duration": duration}, energy, alone=alone)
+
+    def stronger(self, steps: int) -> Solution:
+        """Return the flight with so many steps of `POWER_STEP` more power, fewer below 0."""
+        powers = zip(ALIASES[POWER], map(dbm, self.plan.powers), strict=True)
+        return self.changed({key: round(own + steps * POWER_STEP, 6) for key, own in powers})
+
+    def of_share(self, shares: int) -> Solution:
+        """Return the flight within so many shares of the energy that `whole` takes."""
+        return self.within(shares * ENERGY_SHARE * self.taken)
+
+    def within(self, energy: float) -> Solution:
+        """Return the flight of most data within `energy`, or where a rate is asked for of that.
+
+        Raises `InfeasibleError` where none was found.
+        """
+        from scipy.optimize import minimize_scalar
+
+        if energy >= self.taken:
+            return self.whole
+        assert self.last is not None
+        step, tried = self.plan.flight.time_step, dict[int, Solution]()
+        low, high = fewest_slots(self.plan), self.plan.flight.slots
+        high = min(high, int(energy / (_least_power(self.plan) * step)))
+        if (near := self.last.problem.energy) < math.inf:
+            centre = len(self.last.w) * energy / near
+            low = max(low, int((1 - _NEAR) * centre))
+            high = min(high, math.ceil((1 + _NEAR) * centre))
+
+        def missed(slots: float) -> float:
+            n = round(slots)
+            if n not in tried:
+                with suppress(InfeasibleError):
+                    tried[n] = self.lasting(n, energy, alone=True)
+                    self.last = max(tried.values(), key=self.data)
+            return -self.data(tried[n]) if n in tried else 0.0
+
+        if high >= low:
+            within = max(0.5, _PRECISION * high)
+            minimize_scalar(missed, bounds=(low, high), method="bounded", options={"xatol": within})
+        if not tried:
+            duration, least = thriftiest_straight(self.plan)
+            if least <= energy:
+                missed(duration / step)
+        if not tried:
+            raise InfeasibleError(
+                f"{self.plan.source}: goal.energy_wh: no flight was found that takes at most "
+                f"{energy / JOULES_PER_WH:.4g} Wh with its relay; straight from start to end it "
+                f"takes {least / JOULES_PER_WH:.4g} Wh, in {duration:g} s"
+            )
+        return self.last
+
+    def ended(self, found: Solution) -> Solution:
+        """Return the flight of the duration and energy of `found` from all starts."""
+        energy = found.problem.energy
+        if energy == math.inf:
+            return found
+        return max(self.lasting(len(found.w), energy), found, key=self.data)
 
 
-def _durations(plan: Plan, observe: Observer | None) -> _Steps:
-    """Return numbers of slots.
+def _least_power(plan: Plan) -> float:
+    """Return the least power of flight and relay, W."""
+    assert plan.power_model is not None  # goals of an energy have one
+    fastest = plan.max_ground_speed + math.hypot(*plan.wind)
+    airspeeds = np.linspace(plan.vehicle.min_speed, fastest, 10 * _COMPARED)
+    return plan.power_model.least_power(airspeeds)[1] + plan.radio.relay.power
 
-    R_del is at most that of the longer flight: the first guess for megabytes is the time in which
-    that rate delivers them, for a rate the shortest flight.
+
+def thriftiest_straight(plan: Plan) -> tuple[float, float]:
+    """Return the duration, s, of the straight flight that takes the least, and an energy for it, J.
+
+    The energy is what a search has to be given that starts there; infinite where there is none.
     """
-    low, high = fewest_slots(plan) - 1, plan.flight.slots
-
-    def changes(number: int) -> dict[str, float]:
-        return {"flight.duration": round(number * plan.flight.time_step, 9)}
-
-    def first(whole: Solution) -> int:
-        if plan.goal.deliver_mbytes is None:
-            return low + 1
-        return int(high * whole.plan.needed_rate / whole.delivered_rate)
-
-    return _of_plans(plan, observe, low, high, plan.flight.duration, changes, first)
-
-
-def _powers(plan: Plan, observe: Observer | None) -> _Steps:
-    """Return numbers of steps of `POWER_STEP` by which both powers are changed, none or less."""
-    given = {key: dbm(power) for key, power in zip(ALIASES[POWER], plan.powers, strict=True)}
-    low = -int((min(given.values()) - MIN_DBM) / POWER_STEP) - 1
-
-    def changes(number: int) -> dict[str, float]:
-        return {key: round(power + number * POWER_STEP, 6) for key, power in given.items()}
-
-    def first(whole: Solution) -> int:
-        spare = whole.delivered_rate - whole.plan.needed_rate
-        return -int(spare / _BITS_PER_DB / POWER_STEP)
-
-    limit = given[ALIASES[POWER][0]]
-    return _of_plans(plan, observe, low, 0, limit, changes, first)
-
-
-def _energies(plan: Plan, observe: Observer | None) -> _Steps:
-    """Return numbers of `ENERGY_SHARE` of what the flight of the plan's whole duration takes."""
-    within, high = WithinEnergy(plan, observe), round(1 / ENERGY_SHARE)
-    step = ENERGY_SHARE * within.unlimited_energy
-
-    def at(number: int, _: Solution | None) -> Solution:
-        return within.unlimited if number == high else within.best(number * step)
-
-    def first(whole: Solution) -> int:
-        """Return the share of the time that is needed, at least what the straight flight takes."""
-        share = whole.plan.needed_rate / whole.delivered_rate
-        straight = math.ceil(within.straight[1] / step)
-        return max(int(high * share) if plan.goal.deliver_mbytes is not None else 0, straight)
-
-    def ended(number: int, found: Solution) -> Solution:
-        return found if number == high else within.ended(found, number * step)
-
-    limit = within.unlimited_energy / JOULES_PER_WH
-    return _Steps(0, high, limit, at, first, ended, lambda: within.optimizations)
+    taken = [(math.inf, math.inf)]
+    problem = replace(build_problem(plan), energy=0.0)
+    slots = np.linspace(fewest_slots(plan), plan.flight.slots, _COMPARED).astype(int)
+    for n in np.unique(slots).tolist():
+        kin = replace(problem.kinematics, slots=n)
+        limit = problem.energy_limit(kin)
+        assert limit is not None
+        with suppress(InfeasibleError):
+            energy = limit.used(straight_flight(kin)) - limit.most  # and the relay's
+            taken.append(((1 + _ABOVE) * energy, round(n * kin.time_step, 9)))
+    least, duration = min(taken)
+    return duration, least
 
 
 def _out_of_reach(plan: Plan, best: Solution) -> str:

@@ -24,14 +24,10 @@ def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[Own
         raise InputError(f"{', '.join(parts)}: a plan with a goal takes no parts of one's own")
     if parts and plan.optimizer.method == "algorithm1":
         raise InputError(f"{', '.join(parts)}: Algorithm 1 takes no parts of one's own")
-    if plan.goal.minimise is not None:
-        from faao_mav.optimizer.goal import least
+    if plan.goal.minimise or plan.goal.maximise == "data":
+        from faao_mav.optimizer.goal import reach_goal
 
-        return least(plan, observe=observe)
-    if plan.goal.maximise == "data":
-        from faao_mav.optimizer.most_data import most_data
-
-        return most_data(plan, observe=observe)
+        return reach_goal(plan, observe=observe)
     problem = build_problem(plan, **parts)
     if plan.optimizer.method == "algorithm1":
         from faao_mav.optimizer.algorithm1 import algorithm1  # CVXPY takes half a second

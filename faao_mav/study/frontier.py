@@ -81,7 +81,7 @@ def _durations(plan: Plan, points: int) -> list[dict[str, float]]:
 
 def _energies(plan: Plan, points: int) -> list[dict[str, float]]:
     from faao_mav.optimizer.direct import direct
-    from faao_mav.optimizer.most_data import thriftiest_straight
+    from faao_mav.optimizer.goal import thriftiest_straight
     from faao_mav.optimizer.problem import build_problem
 
     if plan.vehicle.power is None or not plan.radio.causal:

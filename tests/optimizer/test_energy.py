@@ -10,10 +10,10 @@ from certificate import still_gained
 from random_flights import random_flight
 
 from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer import goal
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import ENERGY_SHARE
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.most_data import WithinEnergy
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
@@ -142,11 +142,11 @@ def test_where_no_less_energy_will_do_every_share_is_refused(
 ) -> None:
     tried: list[float] = []
 
-    def none(_: WithinEnergy, energy: float) -> Solution:
-        tried.append(energy)
+    def none(flights: goal._Flights, number: int) -> Solution:
+        tried.append(number * ENERGY_SHARE * flights.taken)
         raise InfeasibleError("none")
 
-    monkeypatch.setattr(WithinEnergy, "best", none)
+    monkeypatch.setattr(goal._Flights, "of_share", none)
     found = optimize(COPTER.changed({"goal": {"rate": 0.1, "minimise": "energy"}}))
     assert len(tried) > 1
     assert max(tried) == pytest.approx((1 - ENERGY_SHARE) * used(found) * 3600)
