@@ -27,7 +27,7 @@ from peer import Model, at_best, curve, peer_starts
 
 from faao_mav.optimizer import direct
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
@@ -125,9 +125,9 @@ def by_ipopt(problem: Problem, field: RateField, random: int) -> tuple[float, li
         model = model or Model(kin, rates, PATIENCE, relay)
         found = model.solve(rates, flight)
         seconds.append(time.process_time() - began)
-        values = field.value(found.w.T[:, None])
+        values = field.value(found.w.T)
         if max(kin.residuals(found).values()) < 1e-4:
-            best = max(best, float(objectives(values, kin, relay)[0]))
+            best = max(best, objective(values, kin, relay))
     return best, seconds
 
 
@@ -156,8 +156,8 @@ def by_direct(read: Plan) -> tuple[float, float, float]:
     if read.radio.rates is None:
         return solution.delivered_rate, took - apart, took
     problem = solution.problem
-    values = rate_field(problem, design(read)).value(solution.w.T[:, None])
-    return float(objectives(values, problem.kinematics, problem.relay)[0]), took - apart, took
+    values = rate_field(problem, design(read)).value(solution.w.T)
+    return objective(values, problem.kinematics, problem.relay), took - apart, took
 
 
 def main() -> None:

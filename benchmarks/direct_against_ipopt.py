@@ -28,7 +28,7 @@ from random_flights import random_flight
 from faao_mav.arrays import Real
 from faao_mav.errors import PlanError
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import maximize, objectives
+from faao_mav.optimizer.interior.maximize import maximize, objective
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
@@ -254,8 +254,10 @@ def best_of_others(read: Plan, count: int) -> float:
     field, best = rate_field(problem, design(read)), 0.0
     for first in range(0, len(flights), 100):
         rates = field.value(np.stack(flights[first : first + 100]).transpose(2, 0, 1))
-        values = objectives(rates, kin, problem.maximised_queue)
-        best = max(best, float(values.max()))
+        values = [
+            objective(values, kin, problem.maximised_queue) for values in rates.swapaxes(0, 1)
+        ]
+        best = max(best, max(values))
     return best
 
 

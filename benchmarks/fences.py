@@ -24,7 +24,7 @@ from fenced import FENCES, dense_path, fenced
 from peer import Model, at_best, curve
 
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
@@ -76,8 +76,8 @@ def by_ipopt(problem: Problem, field: RateField, flights: list[Trajectory]) -> t
         missed = max(*kin.residuals(found).values(), LENGTH * fence.excess(kin, found))
         if missed < _KEPT:
             kept += 1
-            values = field.value(found.w.T[:, None])
-            best = max(best, float(objectives(values, kin, relay)[0]))
+            values = field.value(found.w.T)
+            best = max(best, objective(values, kin, relay))
     return best, kept
 
 

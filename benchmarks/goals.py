@@ -18,19 +18,19 @@ from typing import Any
 
 import numpy as np
 
+from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import ENERGY_SHARE
-from faao_mav.optimizer.interior.maximize import constraints_of, maximize_all
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.interior.maximize import constraints_of, maximize
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.sparing import sparing_starts
-from faao_mav.optimizer.search.starts import straight_flight, with_stops
+from faao_mav.optimizer.search.starts import straight_flight
 from faao_mav.optimizer.search.track import nearest_flight
-from faao_mav.optimizer.search.ways import along, shortest_by
+from faao_mav.optimizer.search.ways import shortest_by
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import read_plan
 from faao_mav.plan.fields import dbm
@@ -40,7 +40,7 @@ from faao_mav.power import JOULES_PER_WH
 MISSIONS = Path(__file__).parents[1] / "missions"
 LESS_DB = 0.02
 TRIES = 10
-"""Random ways that are tried for each start inside a fence."""
+"""Random ways that are tried for each start: of some no flight is found."""
 
 PLANE = {"cruise_w": 120, "at": 15, "mass": 2}
 
@@ -81,22 +81,6 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-def at_random(kin: Kinematics, rng: np.random.Generator, reach: float) -> Trajectory:
-    """Return a flight by two random places, or where time is short the straight one, bent."""
-    middle, straight = (kin.start + kin.end) / 2, straight_flight(kin)
-    for _ in range(50):
-        flight = with_stops(kin, list(middle + rng.uniform(-reach, reach, (2, 2))))
-        if flight is not None:
-            return flight
-        reach *= 0.95
-    bend = rng.uniform(0, 3) * rng.standard_normal(2) + rng.standard_normal(straight.a.shape)
-    for size in 0.8 ** np.arange(30):
-        bent = kin.integrate(straight.v[0], straight.a + size * bend)
-        if max(kin.residuals(bent).values()) < 1e-9:
-            return bent
-    return straight
-
-
 def less(found: Solution) -> Problem:
     """Return the problem of `found` with one slot, 0.02 dB or one share of the energy less."""
     plan, goal = found.plan, found.plan.goal.minimise
@@ -113,50 +97,39 @@ def less(found: Solution) -> Problem:
 
 
 def from_random(problem: Problem, count: int) -> float:
-    """Return the best delivered rate from `count` random flights, bit/s/Hz."""
-    rng, kin = np.random.default_rng(1), problem.kinematics
-    kept = problem.constraints(kin)
-    reach = float(np.linalg.norm(kin.end - kin.start))
-    area, inside = problem.free_area, list[Trajectory]()
+    """Return the best delivered rate from `count` flights near to random ways, bit/s/Hz."""
+    rng, kin, area = np.random.default_rng(1), problem.kinematics, problem.free_area
+    fenced, kept = problem.fenced(kin), problem.constraints(kin)
+    straight, field = straight_flight(kin), rate_field(problem, design(problem.plan))
+    reach, reached = float(np.linalg.norm(kin.end - kin.start)), list[float]()
     for _ in range(TRIES * count):
-        if len(inside) == count:
-            break
-        flight: Trajectory | None
-        if kin.min_speed > 0:
-            flight = circling(kin, rng, reach)
-        elif area is None:
-            flight = at_random(kin, rng, reach)
-        else:
-            middle = (kin.start + kin.end) / 2
-            stops = [
-                area.nearest(p, kin.start) for p in middle + rng.uniform(-reach, reach, (2, 2)) / 2
-            ]
-            way = shortest_by(area, [kin.start, *stops[: rng.integers(3)], kin.end])
-            flight = None if way is None else along(kin, way, kept)
+        places = list((kin.start + kin.end) / 2 + rng.uniform(-reach, reach, (2, 2)))
+        way: Real | None = np.array([kin.start, *places, kin.end])
+        if area is not None:
+            stops = [area.nearest(place, kin.start) for place in places]
+            way = shortest_by(area, [kin.start, *stops, kin.end])
+        if way is None:
+            continue
+        share = np.sort(np.append(rng.uniform(0, 1, len(way) - 2), (0.0, 1.0)))
+        at = np.linspace(0, 1, kin.slots)
+        path = np.stack([np.interp(at, share, x) for x in way.T], axis=1)
+        flight = nearest_flight(kin, path, straight, fenced)
         if flight is not None and problem.energy < math.inf:
-            every = (*constraints_of(kin), *kept)
-            flight = sparing_starts(kin, {"": flight}, every).get("")
+            flight = sparing_starts(kin, {"": flight}, (*constraints_of(kin), *kept)).get("")
         if flight is not None:
-            inside.append(flight)
-    optima = maximize_all(
-        kin,
-        rate_field(problem, design(problem.plan)),
-        inside,
-        constraints=kept,
-        tolerance=1e-4,
-        max_iterations=300,
-        relay=problem.relay,
-    )
-    return max((optimum.value for optimum in optima), default=math.nan)
-
-
-def circling(kin: Kinematics, rng: np.random.Generator, reach: float) -> Trajectory | None:
-    """Return the flight of a least speed nearest to a way by two random places."""
-    places = [kin.start, *(kin.start + kin.end) / 2 + rng.uniform(-reach, reach, (2, 2)), kin.end]
-    share = np.sort(np.append(rng.uniform(0, 1, 2), (0.0, 1.0)))
-    at = np.linspace(0, 1, kin.slots)
-    path = np.stack([np.interp(at, share, x) for x in np.transpose(places)], axis=1)
-    return nearest_flight(kin, path, straight_flight(kin))
+            found = maximize(
+                kin,
+                field,
+                flight,
+                constraints=kept,
+                tolerance=1e-4,
+                max_iterations=300,
+                relay=problem.relay,
+            )
+            reached.append(found.value)
+        if len(reached) == count:
+            break
+    return max(reached, default=math.nan)
 
 
 def main() -> None:

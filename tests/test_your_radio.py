@@ -12,7 +12,7 @@ from conftest import SMALL, MakePlan, edited
 from faao_mav.errors import PlanError
 from faao_mav.fly.radio import Radios
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
@@ -181,7 +181,7 @@ def test_what_is_priced_is_what_was_maximised(tmp_path: Path, changes: dict[str,
     solution = optimize(plan)
     problem, queue = solution.problem, solution.problem.maximised_queue
     field = rate_field(problem, design(plan), 0.5)
-    smooth = objectives(field.value(solution.w.T[:, None]), problem.kinematics, queue)[0]
+    smooth = objective(field.value(solution.w.T), problem.kinematics, queue)
     priced = solution.delivered_rate if queue else solution.rates.R_avg
     assert priced == pytest.approx(smooth, rel=0.01)
     assert (np.diff(solution.history) >= 0).all()

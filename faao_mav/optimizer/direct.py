@@ -25,7 +25,7 @@ from faao_mav.optimizer.interior.maximize import (
     constraints_of,
     feasible,
     maximize,
-    objectives,
+    objective,
 )
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.interior.search import WARM_START, StartStrategy
@@ -102,7 +102,7 @@ def direct(
             coarse=problem.energy == np.inf,  # the copy cannot make the circles that save energy
         )
     flights = [*routes.values(), *rough.flights.values()]
-    values = objectives(field.value(_positions(flights)), kin, relay)
+    values = np.array([objective(field.value(flight.w.T), kin, relay) for flight in flights])
     going = [rough.flights[name] for name in rough.promising]
     if (first := int(values.argmax())) < len(routes):  # no start was improved as far
         going.append(flights[first])
@@ -199,11 +199,6 @@ def _in_time(problem: Problem, flight: Trajectory) -> Real:
     return slower if near is None else near.v
 
 
-def _positions(flights: Sequence[Trajectory]) -> Real:
-    """Return the positions of the `flights`, (2, flights, n)."""
-    return np.stack([flight.w.T for flight in flights], axis=1)
-
-
 def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> LocalOptimum:
     """Return the best of `optima`; of equal ones that which delivers most, then the first.
 
@@ -211,9 +206,12 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
     """
     most = max(optimum.value for optimum in optima)
     equal = [optimum for optimum in optima if optimum.value > most - EQUAL]
-    rates = field.value(_positions([optimum.trajectory for optimum in equal]))
-    delivered = objectives(rates, problem.kinematics, problem.relay)
-    return equal[int(np.argmax(np.round(delivered / EQUAL)))]
+
+    def delivered(optimum: LocalOptimum) -> float:
+        rates = field.value(optimum.trajectory.w.T)
+        return round(objective(rates, problem.kinematics, problem.relay) / EQUAL)
+
+    return max(equal, key=delivered)
 
 
 def _maximized(
@@ -266,8 +264,7 @@ def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
         link.rates(w, link.small_scale(w), P)
         for link, P in zip(problem.links, precoders, strict=True)
     ]
-    values = objectives(np.stack(rates)[:, None], problem.kinematics, problem.maximised_queue)
-    return float(values[0])
+    return objective(np.stack(rates), problem.kinematics, problem.maximised_queue)
 
 
 def _designed(

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from random_flights import random_flight
 
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
@@ -85,8 +85,8 @@ def test_no_flight_is_above_the_bound(
 ) -> None:
     problem = bounded[kind].problem
     flight = random_flight(problem.kinematics, seed)
-    rates = rate_field(problem, design(problem.plan)).value(flight.w.T[:, None])
-    reached = float(objectives(rates, problem.kinematics, problem.maximised_queue)[0])
+    rates = rate_field(problem, design(problem.plan)).value(flight.w.T)
+    reached = objective(rates, problem.kinematics, problem.maximised_queue)
     assert reached <= limits[kind]
 
 

@@ -161,8 +161,6 @@ def test_the_optimum_is_feasible_better_and_stationary(name: str) -> None:
     assert best.iterations <= 60
     assert best.value == reward(stage, best.trajectory)
     assert best.value > reward(stage, start)
-    assert best.weights.min() >= 0
-    assert best.weights.sum() == pytest.approx(1)
     if kin.slots <= 250:
         # no flight within a metre of it gains more than this share of its reward
         assert kkt_residual(kin, stage, best.trajectory) < 1e-5 * best.value
@@ -215,7 +213,6 @@ def test_a_flat_reward_returns_the_start(stage: Stage) -> None:
     assert best.converged
     assert best.iterations == 0
     assert best.value == 2
-    assert best.weights.sum() == 1
 
 
 def test_a_reward_that_fails_somewhere_is_avoided() -> None:
@@ -293,7 +290,6 @@ def test_symmetric_problems_have_symmetric_optima() -> None:
 
     pair = np.array([[0.0, 80.0], [0.0, -80.0]])
     two = maximize(kin, links(bpsk, 4e4, 4e4, stations=pair), straight_flight(kin))
-    assert two.weights == pytest.approx([0.5, 0.5], abs=1e-3)
     assert abs(two.trajectory.w[:, 1]).max() < 1e-2
 
     same = maximize(kin, links(bpsk, 4e4, 4e4, stations=pair[[0, 0]]), straight_flight(kin))
@@ -307,11 +303,6 @@ def test_the_unit_of_the_reward_does_not_matter() -> None:
     small = maximize(kin, links(bowl, 1e-17, 2e-17), start)
     assert small.value * 1e12 == pytest.approx(large.value, rel=1e-6)
     assert small.iterations == large.iterations
-
-
-def test_a_link_far_better_than_the_other_has_no_weight() -> None:
-    kin, stage = SCENARIOS["dominated"]
-    assert maximize(kin, stage, straight_flight(kin)).weights == pytest.approx([0, 1], abs=1e-5)
 
 
 def test_the_certificate_sees_what_is_to_be_gained() -> None:

@@ -12,7 +12,7 @@ from random_flights import random_flight
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import objectives
+from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
@@ -103,8 +103,8 @@ class Bounded:
 
     def value(self, w: Real) -> float:
         """What the best precoders make of the positions w (n, 2): the rate that is maximised."""
-        rates = self.field.value(w.T[:, None])
-        return float(objectives(rates, self.problem.kinematics, self.problem.maximised_queue)[0])
+        rates = self.field.value(w.T)
+        return objective(rates, self.problem.kinematics, self.problem.maximised_queue)
 
 
 @pytest.fixture(scope="module")

@@ -106,11 +106,12 @@ def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(
     problem = build_problem(small_plan())
     flight = next(iter(starts_of(problem).values()))
 
-    def ends(*_: object, **__: object) -> list[LocalOptimum]:
-        values = (0.5, 0.5 + 1e-15)
-        return [LocalOptimum(flight, value, np.ones(2), 1, 0.0, True) for value in values]
+    values = iter((0.5, 0.5 + 1e-15))
 
-    monkeypatch.setattr(multistart, "maximize_all", ends)
+    def end(*_: object, **__: object) -> LocalOptimum:
+        return LocalOptimum(flight, next(values), 1, 0.0, True)
+
+    monkeypatch.setattr(multistart, "maximize", end)
     flights, field = {"bs": flight, "user": flight}, rate_field(problem, design(problem.plan))
     found = improve_starts(problem.kinematics, field, flights, tolerance=1e-3, max_iterations=1)
     assert found.promising == ["bs"]

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ _ALLOWED = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class LocalOptimum:
-    """A feasible flight, its min_j F_j, and the multipliers of t <= F_j, which sum to one.
+    """A feasible flight and its min_j F_j, or what the relay delivers.
 
     `residual` is the largest of: the scaled gradient of the Lagrangian, the violation of a
     limit, and the complementarity gap per slot; `converged` tells that it met the tolerance.
@@ -30,7 +29,6 @@ class LocalOptimum:
 
     trajectory: Trajectory
     value: float
-    weights: Real
     iterations: int
     residual: float
     converged: bool
@@ -68,11 +66,9 @@ def maximize(
     """
     kept = (*constraints_of(kin), *constraints)
     rewards = Rewards(stage, start.w.T)
-    first = float(objectives(rewards.base[:, None], kin, relay)[0])
+    first = objective(rewards.base, kin, relay)
     if rewards.flat:
-        means = rewards.base.mean(axis=1)
-        lowest = means == means.min()
-        return LocalOptimum(start, first, lowest / lowest.sum(), 0, 0.0, True)
+        return LocalOptimum(start, first, 0, 0.0, True)
     search = Search(
         kin,
         kept,
@@ -82,28 +78,21 @@ def maximize(
         strategy=strategy or (SLOW_START if kin.min_speed > 0 else COLD_START),
     )
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
-        end = search.run(max_iterations)
-    flight = feasible(kin, start, end.v.T * kin.max_speed, kept)
-    value = float(objectives(stage(flight.w.T).value[:, None], kin, relay)[0])
-    converged = end.converged and value > first - tolerance * abs(first)
+        converged = search.run(max_iterations)
+    flight = feasible(kin, start, search.v.T * kin.max_speed, kept)
+    value = objective(stage(flight.w.T).value, kin, relay)
+    converged &= value > first - tolerance * abs(first)
     if not value >= first:
         flight, value = start, first
-    return LocalOptimum(flight, value, end.weights, end.iterations, end.residual, converged)
+    return LocalOptimum(flight, value, search.iterations, search.residual, converged)
 
 
-def maximize_all(
-    kin: Kinematics, stage: Stage, starts: Sequence[Trajectory], **options: Any
-) -> list[LocalOptimum]:
-    """Return what `maximize` finds from each of the `starts`."""
-    return [maximize(kin, stage, start, **options) for start in starts]
-
-
-def objectives(values: Real, kin: Kinematics, relay: RelayQueue | None) -> Real:
-    """Return min_j F_j, or what `relay` delivers of both rates `values` (J, flights, n)."""
+def objective(values: Real, kin: Kinematics, relay: RelayQueue | None) -> float:
+    """Return min_j F_j, or what `relay` delivers, of rewards or both rates `values` (J, n)."""
     if relay is None:
-        return np.asarray(values.mean(axis=-1).min(axis=0))
-    flights = values.swapaxes(0, 1)
-    return np.array([relay.relayed(I_U, I_G, kin.time_step).rate for I_U, I_G in flights])
+        return float(values.mean(axis=1).min())
+    I_U, I_G = values
+    return relay.relayed(I_U, I_G, kin.time_step).rate
 
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:

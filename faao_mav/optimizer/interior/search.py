@@ -79,17 +79,6 @@ WARM_START = StartStrategy(mu=1e-2, room=0.03)
 """For starts that are nearly optimal."""
 
 
-@dataclass(frozen=True, slots=True)
-class SearchResult:
-    """Where a search ended: scaled speeds v (2, n), and the rest as in `LocalOptimum`."""
-
-    v: Real
-    weights: Real
-    iterations: int
-    residual: float
-    converged: bool
-
-
 def best_floor(total: Real, weight: float) -> float:
     """Return the t that maximises t + `weight` sum_j log(total_j - t) of `total` (J,).
 
@@ -108,7 +97,11 @@ def best_floor(total: Real, weight: float) -> float:
 
 
 class Search:
-    """A search from the unknowns w, v, a (6, n) of a start, in solver units."""
+    """A search from the unknowns w, v, a (6, n) of a start, in solver units.
+
+    `v` (2, n) are the velocities of the best iterate that keeps the limits, `residual` that of the
+    last one, `iterations` how many there were.
+    """
 
     def __init__(
         self,
@@ -136,25 +129,19 @@ class Search:
         )
         self.proximal, self.steepness = 0.0, 1.0
         self.iterations = self.attempts = self.short = self.centrings = 0
-        self.best, self.best_v = -np.inf, x[list(V)]
+        self.best, self.v, self.residual = -np.inf, x[list(V)], np.inf
 
-    def run(self, max_iterations: int) -> SearchResult:
-        """Iterate until the search has ended."""
+    def run(self, max_iterations: int) -> bool:
+        """Iterate until the search has ended, and return whether it has converged."""
         while True:
             slope, residual = self._measure()
-            converged = residual < self.tolerance
             lost = self.iterations >= max_iterations or self.centrings > _MAX_CENTRINGS
             # not finite: the limits have no interior left
-            if converged or not np.isfinite(residual) or (lost and not self.attempts):
-                weights = self.iterate.z[self.system.floored]
-                v = self.best_v if self.best > -np.inf else self.iterate.at.x[list(V)]
-                return SearchResult(
-                    v,
-                    weights,
-                    self.iterations,
-                    residual if np.isfinite(residual) else np.inf,
-                    bool(converged),
-                )
+            self.residual = residual if np.isfinite(residual) else np.inf
+            if residual < self.tolerance or not np.isfinite(residual):
+                return bool(residual < self.tolerance)
+            if lost and not self.attempts:
+                return False
             self._advance(slope)
 
     def _floor(self, at: Functions, s: Real) -> tuple[float, Real]:
@@ -188,8 +175,9 @@ class Search:
         broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
         broken *= max(1.0, self.tolerance / _STRICT)
         value = self._value(at)
-        if broken < self.tolerance and value > self.best:
-            self.best, self.best_v = value, at.x[list(V)]
+        kept = broken < self.tolerance
+        if (kept and value > self.best) or self.best == -np.inf:
+            self.best, self.v = value if kept else -np.inf, at.x[list(V)]
         # where the rewards are steeper than at the start, their unit is larger
         self.steepness = max(1.0, system.steepness(at, it.z))
         slope, gap = slope / self.steepness, gap / self.steepness

@@ -10,7 +10,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import Constraint
-from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize_all
+from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -92,17 +92,20 @@ def improve_starts(
         copy, reward = coarse_copy(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
         tolerance = max(tolerance, _COARSE_TOLERANCE)
         on_copy = [copy.follow(resampled(kin, flight, copy)) for flight in on_copy]
-    solved = maximize_all(
-        copy,
-        reward,
-        on_copy,
-        constraints=constraints(copy),
-        tolerance=tolerance,
-        max_iterations=max_iterations,
-        relay=relay,
-    )
-    optima = dict(zip(flights, solved, strict=True))
-    best = max(optimum.value for optimum in solved)
+    kept = constraints(copy)
+    optima = {
+        name: maximize(
+            copy,
+            reward,
+            start,
+            constraints=kept,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+            relay=relay,
+        )
+        for name, start in zip(flights, on_copy, strict=True)
+    }
+    best = max(optimum.value for optimum in optima.values())
     least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
     promising: list[str] = []
     for name in optima:  # of flights that count as one the first: values hang on rounding

@@ -71,9 +71,9 @@ def nearest_flight(
         )
         for most in range(_LOOK, steps + _LOOK, _LOOK) if first else (steps,):
             with np.errstate(all="ignore"):
-                found = search.run(min(most, steps))
-            start = kin.follow(found.v.T * kin.max_speed)
-            if found.converged or (first and _keeps(kin, every, start)):
+                converged = search.run(min(most, steps))
+            start = kin.follow(search.v.T * kin.max_speed)
+            if converged or (first and _keeps(kin, every, start)):
                 break
     return start if _keeps(kin, (*constraints_of(kin), *constraints), start) else None
 
