@@ -15,9 +15,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "wire"))
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fly"))
+sys.path += [str(Path(__file__).parents[1] / "tests" / each) for each in ("", "wire", "fly")]
 
 from trials import Trial, flown
 

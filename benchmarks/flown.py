@@ -11,9 +11,8 @@ One row for each plan: rms position error at equal times (m), how much later tha
 is over (s), the delivered rate over the planned one; each as predicted and as flown.
 """
 
-import csv
+import argparse
 import os
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -22,21 +21,28 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
 import numpy as np
-import record_plane
-from record_px4 import in_wind
+from conftest import MISSIONS, edited
+from flights import PLANE, PLANE_BODY
+from record import flown_by, in_wind
 from simulators import simulated, start_log
 
-from faao_mav import Result, plan_mission
+from faao_mav import Result, parse_plan, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.wire.client import upload
 from missions import PLANS, plan_of, random_changes
+
+Changes = dict[str, Any]
+"""Changes of a sample plan, by dotted keys."""
 
 RUNNERS = {
     "ardupilot": ("fly_arducopter.py", ["--speedup", "20"]),
@@ -45,43 +51,21 @@ RUNNERS = {
 }
 """The runner of each autopilot, with its options: little air drag for PX4's aircraft."""
 
-FLOWN: dict[str, dict[str, Any]] = {
-    name: PLANS[name]
-    for name in (
-        "copter_relay, 120 s, 8 m/s",
-        "short, 60 s, 6 m/s",
-        "slow, 90 s, 4 m/s",
-        "two hovers, 200 s, 9 m/s",
-        "curved, 75 s, 8 m/s",
-    )
+_FAST: Changes = {"flight.duration": 90, "vehicle.max_speed": 10, "vehicle.max_acceleration": 2.5}
+_FREE: Changes = {"flight.start_velocity": "free", "flight.end_velocity": "free"}
+_OF_MISSIONS = ("copter_relay", "short", "slow", "two hovers, 200", "curved, 75")
+
+FLOWN: dict[str, Changes] = {
+    name: changes for name, changes in PLANS.items() if name.startswith(_OF_MISSIONS)
 } | {
     "brief, 80 s, 7 m/s": {
         "flight.duration": 80,
         "vehicle.max_speed": 7,
         "radio.ground_user.position": [350, 200],
     },
-    "free ends, 90 s, 10 m/s": {
-        "flight.duration": 90,
-        "vehicle.max_speed": 10,
-        "vehicle.max_acceleration": 2.5,
-        "flight.start_velocity": "free",
-        "flight.end_velocity": "free",
-    },
-    "the same, 45 degrees of lean": {
-        "flight.duration": 90,
-        "vehicle.max_speed": 10,
-        "vehicle.max_acceleration": 2.5,
-        "vehicle.parameters": {"ANGLE_MAX": 4500},
-        "flight.start_velocity": "free",
-        "flight.end_velocity": "free",
-    },
-    "gentle, 90 s, 10 m/s": {
-        "flight.duration": 90,
-        "vehicle.max_speed": 10,
-        "vehicle.max_acceleration": 0.6,
-        "flight.start_velocity": "free",
-        "flight.end_velocity": "free",
-    },
+    "free ends, 90 s, 10 m/s": _FAST | _FREE,
+    "the same, 45 degrees of lean": _FAST | _FREE | {"vehicle.parameters": {"ANGLE_MAX": 4500}},
+    "gentle, 90 s, 10 m/s": _FAST | _FREE | {"vehicle.max_acceleration": 0.6},
     "16-QAM, 240 s, 5 m/s": {
         "flight.duration": 240,
         "vehicle.max_speed": 5,
@@ -90,65 +74,62 @@ FLOWN: dict[str, dict[str, Any]] = {
         "radio.ground_user.position": [400, 250],
     },
 }
+"""Plans for copters, as changes of `missions/copter_relay.yaml`."""
 
 
-PLANES: dict[str, tuple[dict[str, Any], float]] = {
-    "plane_relay, 180 s, 13-16 m/s": ({}, 584.0),
-    "the same at sea level": ({}, 0.0),
-    "plane, 150 s, 14-18 m/s": (record_plane.PLANS["plan-150-18"], 0.0),
-    "plane, 120 s, 14-15 m/s": (record_plane.PLANS["plan-120-15"], 584.0),
-    "plane, 240 s, 12-20 m/s": (
-        {
-            "flight.duration": 240,
-            "vehicle.min_speed": 12,
-            "vehicle.max_speed": 20,
-            "flight.end": [-400, -200],
-        },
-        0.0,
-    ),
-    "plane, 90 s, 16-22 m/s": (
-        {
-            "flight.duration": 90,
-            "vehicle.min_speed": 16,
-            "vehicle.max_speed": 22,
-            "vehicle.max_acceleration": 4,
-            "flight.start": [-600, 0],
-        },
-        584.0,
-    ),
+def planes(duration: int, least: int, most: float, elevation: float, **more: Any) -> Changes:
+    """Return a plan for a plane: s, m/s, m above the sea, and keys of `flight`."""
+    return {
+        "flight.duration": duration,
+        "vehicle.min_speed": least,
+        "vehicle.max_speed": most,
+        "site.origin.elevation": elevation,
+        **{f"flight.{key}": value for key, value in more.items()},
+    }
+
+
+PLANES: dict[str, Changes] = {
+    "plane_relay, 180 s, 13-16 m/s": {"site.origin.elevation": 584.0},
+    "the same at sea level": {"site.origin.elevation": 0.0},
+    "plane, 150 s, 14-18 m/s": planes(150, 14, 18, 0.0)
+    | {"radio.ground_user.position": [700, 300]},
+    "plane, 120 s, 14-15 m/s": planes(120, 14, 15, 584.0, start=[-300, 400], end=[400, -300])
+    | {"vehicle.max_acceleration": 2.5},
+    "plane, 240 s, 12-20 m/s": planes(240, 12, 20, 0.0, end=[-400, -200]),
+    "plane, 90 s, 16-22 m/s": planes(90, 16, 22, 584.0, start=[-600, 0])
+    | {"vehicle.max_acceleration": 4},
 }
-"""Plans for planes, as changes of `missions/plane_relay.yaml`, and the elevation of home, m."""
+"""Plans for planes, as changes of `missions/plane_relay.yaml`."""
+
+
+def plane_of(changes: Changes) -> Plan:
+    """Return the sample plan for the simulator's plane with `changes`."""
+    own = {"vehicle.parameters": PLANE, "vehicle.body": PLANE_BODY}
+    return parse_plan(edited((MISSIONS / "plane_relay.yaml").read_text(), own | changes))
 
 
 def flown(autopilots: Path, autopilot: str, result: Result, folder: Path) -> Prediction:
-    """Fly the mission of `result` and return what it delivers; again if the simulator fails.
+    """Fly the mission of `result` and return what it delivers.
 
-    `autopilots` is the folder with the runners; mission and track are written to `folder`. It is
-    flown in the plan's wind.
+    `autopilots` is the folder with the runners; the mission is written to `folder`. It is flown in
+    the plan's wind.
     """
-    script, options = RUNNERS[autopilot]
+    runner, plan = autopilots / RUNNERS[autopilot][0], result.solution.plan
     files = result.write(folder / "mission.waypoints")
-    command = [sys.executable, str(autopilots / script), str(files[0])]
-    command += ["--param-file", str(files[1])] if len(files) > 1 else []
     own = folder / "own.parm"  # what the plan says that the vehicle has
-    told = result.solution.plan.vehicle.parameters
+    told = plan.vehicle.parameters
     own.write_text("".join(f"{name} {value}\n" for name, value in told.items()))
-    command += ["--param-file", str(own)] if told else []
-    command += in_wind(autopilots / script, result.solution.plan.site.wind)
-    track = folder / "track.csv"
-    for _ in range(4):
-        run = subprocess.run(
-            [*command, *options, "--out", str(track)], capture_output=True, text=True, check=False
-        )
-        if run.returncode == 0:
-            break
-    else:
-        raise SystemExit(f"not flown: {run.stdout[-2000:]}{run.stderr[-2000:]}")
-    with track.open() as file:
-        rows = [(row["t_s"], row["lat"], row["lon"]) for row in csv.DictReader(file)]
-    table = np.array(rows, dtype=float)
-    origin = result.solution.plan.origin
-    frame = LocalFrame(origin.latitude, origin.longitude)
+    options = [*RUNNERS[autopilot][1], *in_wind(runner, plan.site.wind)]
+    for values in (*files[1:2], *([own] if told else [])):
+        options += ["--param-file", str(values)]
+    table = np.array(
+        [
+            [row[key] for key in ("t_s", "lat", "lon")]
+            for row in flown_by(runner, files[0], options)
+        ],
+        dtype=float,
+    )
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     return on_the_plans_clock(result.solution, table[:, 0], frame.to_local(*table[:, 1:].T))
 
 
@@ -209,23 +190,17 @@ def on_the_plans_clock(solution: Solution, t: Real, w: Real) -> Prediction:
     return price_flight(solution, t - begin, w)
 
 
-def row(
-    name: str, autopilots: Path, autopilot: str, wind: dict[str, Any], *, stream: bool = False
-) -> str:
+def row(autopilots: Path, autopilot: str, name: str, changes: Changes, *, stream: bool) -> str:
     """Plan, fly and compare."""
     try:
-        if autopilot == "plane":
-            changes, elevation = PLANES[name]
-            plan = record_plane.plan_of(changes | wind, elevation)
-        else:
-            plan = plan_of(FLOWN[name] | wind, autopilot, "recommend")
+        plane = autopilot == "plane"
+        plan = plane_of(changes) if plane else plan_of(changes, autopilot, "recommend")
         result = plan_mission(plan)
     except FaaoError as error:
         return f"{autopilot:<10}{name:<28}refused: {error}"
     assert result.prediction is not None
     with tempfile.TemporaryDirectory() as folder:
-        run = streamed if stream else flown
-        real = run(autopilots, autopilot, result, Path(folder))
+        real = (streamed if stream else flown)(autopilots, autopilot, result, Path(folder))
     cells = [f"{autopilot:<10}{name:<28}"]
     for found in (result.prediction, real):
         late = found.duration - plan.flight.duration
@@ -234,15 +209,15 @@ def row(
     return "   ".join(cells)
 
 
-def drawn(seed: int) -> dict[str, Any]:
-    """Return the plan that `seed` draws, as changes of the sample, with 3 to 8 m/s of wind."""
+def drawn(seed: int) -> Changes:
+    """Return the plan for a copter that `seed` draws, with 3 to 8 m/s of wind."""
     random = Random(seed + 1000)
     wind = {"speed": round(random.uniform(3, 8), 1), "from": random.randrange(360)}
     return random_changes(seed) | {"site.wind": wind}
 
 
-def drawn_plane(seed: int) -> tuple[dict[str, Any], float]:
-    """Return the plan for a plane that `seed` draws, and the elevation of home, m.
+def drawn_plane(seed: int) -> Changes:
+    """Return the plan for a plane that `seed` draws.
 
     It takes 100 to 240 s, at 12 to 16 m/s and 1.1 to 1.5 times as much, half of them in up to 5 m/s
     of wind.
@@ -250,44 +225,44 @@ def drawn_plane(seed: int) -> tuple[dict[str, Any], float]:
     random = Random(seed)
     least = random.randrange(12, 17)
 
-    def place(reach: int) -> list[int]:
-        return [random.randrange(-reach, reach) for _ in range(2)]
+    def place() -> list[int]:
+        return [random.randrange(-600, 600) for _ in range(2)]
 
-    changes: dict[str, Any] = {
-        "vehicle.min_speed": least,
-        "vehicle.max_speed": round(least * random.uniform(1.1, 1.5), 1),
+    most = round(least * random.uniform(1.1, 1.5), 1)
+    changes: Changes = {
         "vehicle.max_acceleration": round(random.uniform(2.0, 4.0), 1),
-        "flight.start": place(600),
-        "flight.end": place(600),
-        "flight.duration": random.randrange(100, 241, 10),
-        "radio.ground_user.position": place(600),
+        "flight.start": place(),
+        "flight.end": place(),
+        "radio.ground_user.position": place(),
         "radio.modulation": random.choice(("bpsk", "qpsk")),
     }
+    changes |= planes(random.randrange(100, 241, 10), least, most, random.choice((0.0, 584.0)))
     if random.random() < 0.5:
         speed = round(random.uniform(1, 5), 1)
         changes["site.wind"] = {"speed": speed, "from": random.randrange(360)}
-    return changes, random.choice((0.0, 584.0))
+    return changes
 
 
 def main() -> None:
     """Print the table."""
-    chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
-    wind: dict[str, Any] = {}
-    if "--wind" in chosen:
-        speed, start = chosen[chosen.index("--wind") + 1].split(",")
-        wind = {"site.wind": {"speed": float(speed), "from": float(start)}}
-    names: list[str] = []
-    if "--random" in chosen:
-        first, count = map(int, chosen[chosen.index("--random") + 1].split(","))
-        names = [f"random {seed}" for seed in range(first, first + count)]
-        FLOWN.update({name: drawn(int(name.split()[1])) for name in names})
-        PLANES.update({name: drawn_plane(int(name.split()[1])) for name in names})
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("chosen", nargs="*")
+    parser.add_argument("--wind", metavar="SPEED,FROM")
+    parser.add_argument("--stream", action="store_true")
+    parser.add_argument("--random", metavar="FIRST,COUNT")
+    options, wind = parser.parse_args(), Changes()
+    if options.wind:
+        speed, start = map(float, options.wind.split(","))
+        wind = {"site.wind": {"speed": speed, "from": start}}
     print(f"{'':<41}{'predicted: m, s late, rate':<27}flown")
-    for autopilot in [each for each in RUNNERS if each in chosen] or RUNNERS:
-        plans = PLANES if autopilot == "plane" else FLOWN
-        for name in [each for each in plans if each in chosen] or names or plans:
-            stream = "--stream" in chosen
-            print(row(name, autopilots, autopilot, wind, stream=stream), flush=True)
+    for autopilot in [each for each in RUNNERS if each in options.chosen] or RUNNERS:
+        plans, draw = (PLANES, drawn_plane) if autopilot == "plane" else (FLOWN, drawn)
+        if options.random:
+            first, count = map(int, options.random.split(","))
+            plans = {f"random {seed}": draw(seed) for seed in range(first, first + count)}
+        for name in [each for each in plans if each in options.chosen] or plans:
+            where, changes = Path(os.environ["FAAO_AUTOPILOTS"]), plans[name] | wind
+            print(row(where, autopilot, name, changes, stream=options.stream), flush=True)
 
 
 if __name__ == "__main__":

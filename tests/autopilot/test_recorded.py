@@ -1,13 +1,9 @@
 """The flight models against flights of the real autopilots in their simulators."""
 
-import flights_arducopter as arducopter
-import flights_arduplane as arduplane
+import flights
 import numpy as np
 import pytest
 from flight_paths import line, path_of
-from flights_px4 import rows as px4_rows
-from record_px4 import CONVERTED
-from recorded import Row, together
 
 from faao_mav.autopilot.px4 import Px4
 
@@ -15,54 +11,60 @@ Limits = tuple[float, float]
 """The greatest error of arrivals, s, and of positions, m, both rms."""
 
 
-def check(flights: list[Row], each: Limits, path: float, uses: dict[str, Limits]) -> None:
-    """Check the errors of every flight, the greatest of its path, m, and of all of a use."""
-    for flight in flights:
-        assert flight.arrival_rms <= each[0], flight
-        assert flight.position_rms <= each[1], flight
-        assert flight.path_error <= path, flight
+@pytest.mark.parametrize(
+    ("folder", "path", "each", "uses"),
+    [
+        (
+            "arducopter",
+            0.6,
+            {
+                **dict.fromkeys(("in 3", "in 5"), (0.2, 1.0)),
+                **dict.fromkeys(("in 6", "in 8"), (0.4, 1.5)),  # beyond the lean limit too
+                "in 9": (1.4, 8.0),
+                "": (0.3, 1.5),
+            },
+            dict.fromkeys(("fitted", "held out", "splines"), (0.2, 0.6)),
+        ),
+        (
+            "arduplane",
+            10.0,
+            {"": (1.0, 12.0)},
+            dict.fromkeys(
+                ("fitted", "held out, sea", "held out, high", "in 3 m/s", "in 6 m/s"), (0.5, 6.5)
+            ),
+        ),
+        (
+            "px4",
+            1.5,
+            {"slow": (np.inf, np.inf), "": (1.3, 7.0)},
+            {
+                **dict.fromkeys(("fitted", "held out"), (0.5, 2.5)),
+                **dict.fromkeys(("in 6 m/s", "in 9 m/s"), (0.55, 3.4)),
+                "in 3 m/s": (0.7, 3.7),
+            },
+        ),
+    ],
+)
+def test_flights_are_foreseen(
+    folder: str, path: float, each: dict[str, Limits], uses: dict[str, Limits]
+) -> None:
+    """Check each flight, by its use, and all of a use together; and how far the path is off, m."""
+    rows = flights.rows(folder)
+    assert len(rows) == {"arducopter": 40, "arduplane": 43, "px4": 59}[folder]
+    for row in rows:
+        arrival, position = next(most for use, most in each.items() if row.use.startswith(use))
+        assert row.arrival_rms <= arrival, row
+        assert row.position_rms <= position, row
+        assert row.path_error <= path, row
     for use, most in uses.items():
-        arrival, position = together(flights, use)
+        arrival, position = flights.together(rows, use)
         assert arrival <= most[0], use
         assert position <= most[1], use
-
-
-def test_arducopter() -> None:
-    calm = (*arducopter.FITTED, *arducopter.HELD_OUT, *arducopter.SPLINES)
-    assert len(calm) == 18
-    flights = [arducopter.row(name) for name in calm]
-    check(flights, (0.3, 1.5), 0.6, dict.fromkeys(("fitted", "held out", "splines"), (0.2, 0.6)))
-    for wind, number, limits in (
-        ("wind3", 4, (0.2, 1.0)),
-        ("wind5", 1, (0.2, 1.0)),
-        ("wind6", 4, (0.4, 1.5)),  # beyond the lean limit too
-        ("wind8", 1, (0.4, 1.5)),
-        ("wind9", 12, (1.4, 8.0)),
-    ):
-        flights = [arducopter.row(name) for name in arducopter.IN_WIND if wind in name]
-        assert len(flights) == number
-        check(flights, limits, 0.6, {})
-
-
-def test_arduplane() -> None:
-    flights = [arduplane.row(name) for name in (*arduplane.FITTED, *arduplane.HELD_OUT)]
-    assert len(flights) >= 24
-    assert len(arduplane.HELD_OUT) >= len(flights) / 3
-    uses = ("fitted", "held out, sea", "held out, high", "in 3 m/s", "in 6 m/s")
-    check(flights, (1.0, 12), 10, dict.fromkeys(uses, (0.5, 6.5)))
-
-
-def test_px4() -> None:
-    """Wind changes nothing within the lean limit."""
-    flights = px4_rows()
-    assert sum(flight.use == "in wind" for flight in flights) == 12
-    calm = {"fitted": (0.5, 2.5), "held out": (0.5, 2.5)}
-    kept = [flight for flight in flights if flight.use != "slow"]
-    check(kept, (1.3, 7), 1.5, {**calm, "in wind": (0.55, 3.4)})
-    assert all(flight.path_error <= 1.5 for flight in flights)
-    made = [flight for flight in flights if flight.name in CONVERTED]
-    assert np.sqrt(np.mean([flight.arrival_rms**2 for flight in made])) <= 0.3
-    assert np.sqrt(np.mean([flight.position_rms**2 for flight in made])) <= 1.6
+    made = [row for row in rows if row.name in flights.MADE]
+    assert len(made) == (len(flights.MADE) if folder == "px4" else 0)
+    if made:
+        assert np.sqrt(np.mean([row.arrival_rms**2 for row in made])) <= 0.3
+        assert np.sqrt(np.mean([row.position_rms**2 for row in made])) <= 1.6
 
 
 # What PX4 flew in other missions, none of them used for fitting: mean speeds on straight lines
