@@ -5,10 +5,8 @@ import math
 import re
 import time
 import tracemalloc
-from typing import Any
 
 import pytest
-from relay_flights import dash_hover_dash, mission_of, plan_with
 
 from faao_mav.errors import InputError, MissionFileError
 from faao_mav.mission import Home, Mission, MissionItem
@@ -18,12 +16,8 @@ from faao_mav.mission.formats.qgc_plan import read_qgc_plan
 
 PX4 = PlanTarget(12, 2)
 WAYPOINT = MissionItem(16, 3, (0.0, 0.0, 0.0, 1.5), 1.0, 2.0, 3.0)
-GOOD = write_qgc_plan(Mission((WAYPOINT,), Home(1.0, 2.0, 3.0)), PX4)
-
-
-def part_of(mission: Mission) -> dict[str, Any]:
-    part: dict[str, Any] = json.loads(write_qgc_plan(mission, PX4))["mission"]
-    return part
+SOUND = Mission((WAYPOINT,), Home(1.0, 2.0, 3.0))
+GOOD = write_qgc_plan(SOUND, PX4)
 
 
 def test_a_height_that_is_null_is_not_known() -> None:
@@ -38,41 +32,34 @@ def test_a_height_that_is_null_is_not_known() -> None:
 
 def test_the_form_that_qgroundcontrol_asks_for() -> None:
     frames = [0, 2, 3, 5, 6, 10, 11]
-    mission = Mission(tuple(MissionItem(16, frame, z=7.0) for frame in frames))
+    speed = MissionItem(178, 2, (1.0, 8.0, -1.0, 0.0))
+    mission = Mission((*(MissionItem(16, frame, z=7.0) for frame in frames), speed))
     plan = json.loads(write_qgc_plan(mission, PX4))
     assert (plan["fileType"], plan["version"]) == ("Plan", 1)
     assert (plan["geoFence"]["version"], plan["rallyPoints"]["version"]) == (2, 2)
     part = plan["mission"]
     assert (part["version"], part["firmwareType"], part["vehicleType"]) == (2, 12, 2)
     assert part["plannedHomePosition"] == [0, 0, 0]
-    assert [item["doJumpId"] for item in part["items"]] == list(range(1, len(frames) + 1))
+    assert [item["doJumpId"] for item in part["items"]] == list(range(1, len(frames) + 2))
     modes = [item.get("AltitudeMode") for item in part["items"]]
-    assert modes == [2, None, 1, 2, 1, 4, 4]
+    assert modes == [2, None, 1, 2, 1, 4, 4, None]
     shown = part["items"][0]
     assert (shown["Altitude"], shown["AMSLAltAboveTerrain"]) == (7.0, None)
-
-
-def test_speeds_and_altitude_mode_are_those_of_the_mission() -> None:
-    planned = mission_of(*dash_hover_dash(), plan_with(max_speed=8.0))
     keys = ("cruiseSpeed", "hoverSpeed", "globalPlanAltitudeMode")
-    assert [part_of(planned)[key] for key in keys] == [8, 8, 1]
-    assert [part_of(Mission(()))[key] for key in keys] == [15, 5, 0]
-
-
-def test_a_jump_to_no_item_is_not_written() -> None:
+    assert [part[key] for key in keys] == [8, 8, 0]
+    assert [json.loads(GOOD)["mission"][key] for key in keys] == [15, 5, 1]
     for target in (0.0, 3.0, 1.5, math.nan, -1.0):
-        mission = Mission((MissionItem(16, 3), MissionItem(177, 2, (target, 1.0, 0.0, 0.0))))
+        jump = MissionItem(177, 2, (target, 1.0, 0.0, 0.0))
         with pytest.raises(MissionFileError, match=r"x\.plan: item 2: DO_JUMP to .*, 1 to 2"):
-            render_mission(mission, "x.plan")
+            render_mission(Mission((WAYPOINT, jump)), "x.plan")
 
 
 def test_losses_of_a_plan_are_few() -> None:
-    mission = Mission((MissionItem(16, 3),), Home(1.0, 2.0, 3.0))
-    assert render_files(mission, "x.plan", PX4).lost == ()
-    assert render_files(mission, "x.plan").lost == (
+    assert render_files(SOUND, "x.plan", PX4).lost == ()
+    assert render_files(SOUND, "x.plan").lost == (
         "no autopilot is known: the plan is for a generic one",
     )
-    nowhere = Mission(mission.items, unread=("fence",))
+    nowhere = Mission(SOUND.items, unread=("fence",))
     assert render_files(nowhere, "x.plan", PX4).lost == (
         "without the fence that the vehicle may hold: not read from it; QGroundControl clears it "
         "there when it uploads this plan",

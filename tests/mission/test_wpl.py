@@ -11,13 +11,7 @@ from relay_flights import dash_hover_dash, mission_of, plan_with
 from faao_mav.errors import InputError, MissionFileError
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
-from faao_mav.mission.formats import (
-    fence_path,
-    read_mission,
-    read_mission_file,
-    render_mission,
-    write_mission,
-)
+from faao_mav.mission.formats import read_mission, read_mission_file, render_mission, write_mission
 from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl
 from faao_mav.mission.item import home_item
 
@@ -51,7 +45,13 @@ def test_pymavlink_reads_the_same(tmp_path: Path) -> None:
         assert (*params, row.x, row.y, row.z) == item.numbers
 
 
-def test_harmless_oddities_are_read() -> None:
+def with_field(index: int, value: str, row: str = ITEM) -> str:
+    fields = row.split("\t")
+    fields[index] = value
+    return GOOD.replace(row, "\t".join(fields))
+
+
+def test_harmless_oddities_are_read_damage_is_named() -> None:
     for text in (
         GOOD.replace("\n", "\r"),
         GOOD.replace("\n", "  \n\n"),
@@ -59,15 +59,6 @@ def test_harmless_oddities_are_read() -> None:
         GOOD.replace("47.5", "+4.75e1").replace("8.6", "8.60"),
     ):
         assert read_wpl(text).mission == READ
-
-
-def with_field(index: int, value: str, row: str = ITEM) -> str:
-    fields = row.split("\t")
-    fields[index] = value
-    return GOOD.replace(row, "\t".join(fields))
-
-
-def test_damage_is_named() -> None:
     for text, told in (
         ("", "nothing in it; expected 'QGC WPL 110'"),
         (f"{HOME}\n{ITEM}\n", "line 1: '0"),
@@ -99,12 +90,10 @@ def test_rows_that_do_not_count_up_are_read_in_their_order(tmp_path: Path) -> No
     read = read_mission_file(path)
     assert read.mission.items[:3] == READ.items * 3
     assert read.mission.items[-1].params[0] == 2
-    assert read.warnings == (
-        f"{path}: line 2, field frame: '3': row 0 is the home position; its altitude is taken as "
-        "above mean sea level",
-        f"{path}: line 3, field index: '2': indexes do not count up; rows are taken in the file's "
-        "order, in which targets of DO_JUMP count too",
-    )
+    assert [warning.partition("; ")[0] for warning in read.warnings] == [
+        f"{path}: line 2, field frame: '3': row 0 is the home position",
+        f"{path}: line 3, field index: '2': indexes do not count up",
+    ]
     loader = loaded(path)  # pymavlink numbers the rows anew, and leaves the target as it is
     assert [loader.wp(k).seq for k in range(5)] == [0, 1, 2, 3, 4]
     assert loader.wp(4).param1 == 2
@@ -130,30 +119,26 @@ MISSION_PLANNER = """QGC WPL 110
 """A fence in the form in which Mission Planner saves one: a home row, six decimals, heights."""
 
 
-@pytest.mark.parametrize("suffix", [".waypoints", ".txt", ".WAYPOINTS", ".plan", ".Plan"])
-def test_files_by_their_ending_the_fence_of_text_files_beside_them(
-    suffix: str, tmp_path: Path
-) -> None:
-    path, beside = tmp_path / f"m{suffix}", tmp_path / f"m.fence{suffix}"
-    text = suffix.lower() != ".plan"
-    assert [*write_mission(FENCED, path).contents] == ([path, beside] if text else [path])
-    file = read_mission_file(path)
-    assert file.mission == read_mission(str(path)) == FENCED
-    taken = f"{beside}: the fence beside {path.name}, taken with it"
-    assert file.warnings == ((taken,) if text else ())
-    assert fence_path(path) == (beside if text else None)
-    if text:
-        loader = loaded(beside)
-        rows = [loader.wp(k) for k in range(loader.count())]
-        assert [row.command for row in rows] == [16, 5000, *[5001] * 3, *[5002] * 3, 5004]
-        assert (rows[2].param1, rows[8].param1) == (3.0, 40.5)
+def test_files_by_their_ending_the_fence_of_text_files_beside_them(tmp_path: Path) -> None:
+    for suffix in (".waypoints", ".txt", ".WAYPOINTS", ".plan", ".Plan"):
+        path, beside = tmp_path / f"m{suffix}", tmp_path / f"m.fence{suffix}"
+        text = suffix.lower() != ".plan"
+        assert [*write_mission(FENCED, path).contents] == ([path, beside] if text else [path])
+        file = read_mission_file(path)
+        assert file.mission == read_mission(str(path)) == FENCED
+        taken = f"{beside}: the fence beside {path.name}, taken with it"
+        assert file.warnings == ((taken,) if text else ())
+        if text:
+            loader = loaded(beside)
+            rows = [loader.wp(k) for k in range(loader.count())]
+            assert [row.command for row in rows] == [16, 5000, *[5001] * 3, *[5002] * 3, 5004]
+            assert (rows[2].param1, rows[8].param1) == (3.0, 40.5)
 
 
 def test_what_mission_planner_saves_is_read() -> None:
-    fence = Fence(FENCE.polygons[:1], FENCE.circles)
     rows = MISSION_PLANNER.splitlines()
-    assert read_wpl_fence(MISSION_PLANNER) == fence
-    assert read_wpl_fence("\n".join([rows[0], *rows[2:]])) == fence  # as MAVProxy saves it
+    for text in (MISSION_PLANNER, "\n".join([rows[0], *rows[2:]])):  # as MAVProxy saves it
+        assert read_wpl_fence(text) == Fence(FENCE.polygons[:1], FENCE.circles)
     for old, new, told in (
         ("\t5001\t3.0", "\t16\t3.0", r"line 3, field command: '16'; expected 5000 to 5004"),
         ("\t5001\t3.0", "\t5001\t4.0", r"fence: a polygon stops after 3 of its vertices"),
@@ -177,25 +162,20 @@ def test_the_fence_of_an_earlier_mission_goes_a_users_own_stays(tmp_path: Path) 
     assert read_mission(path).fence.circles == FENCE.circles
 
 
-def test_an_unknown_ending_is_refused(tmp_path: Path) -> None:
+def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
     for name in ("flight.mission", "flight", ".waypoints"):
         for use in (read_mission, lambda path: render_mission(READ, path)):
             with pytest.raises(MissionFileError, match=r"ends in .*\.txt .*, \.plan .* or \.kml"):
                 use(tmp_path / name)
-
-
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "x.waypoints"
-    with pytest.raises(MissionFileError, match=r"x\.waypoints: cannot be read: No such file"):
-        read_mission(path)
-    for content, told in (
-        (b"QGC WPL 110\n\xff\xfe", r"x\.waypoints: line 2: byte 0xff is not UTF-8"),
-        (b"#" * 16_000_001, "more than 16,000,000 bytes"),
+    for name, content, told in (
+        ("x.kml", b"<kml>", "KML is written for drawing and lacks"),
+        ("x.waypoints", None, "cannot be read: No such file"),
+        ("x.waypoints", b"QGC WPL 110\n\xff\xfe", "line 2: byte 0xff is not UTF-8"),
+        ("x.waypoints", b"#" * 16_000_001, "more than 16,000,000 bytes"),
+        ("x.plan", b"[" * 100_000, "nested too deep for a plan"),
+        ("x.plan", b'{"a": ' * 100_000, "nested too deep for a plan"),
     ):
-        path.write_bytes(content)
-        with pytest.raises(MissionFileError, match=told):
-            read_mission(path)
-    for deep in ("[", '{"a": '):
-        (tmp_path / "x.plan").write_text(deep * 100_000)
-        with pytest.raises(MissionFileError, match=r"x\.plan: nested too deep for a plan"):
-            read_mission(tmp_path / "x.plan")
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(MissionFileError, match=f"{name}: {told}"):
+            read_mission(tmp_path / name)
