@@ -24,35 +24,24 @@ from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
 ALLOWED = 1e-6
 
-
-def drawn(seed: int) -> str:
-    """Return the YAML of the plan that `seed` draws: one of `processors.py`, with any radio."""
-    random, data = Random(1000 + seed), load_yaml(random_plan(seed), "drawn")
-    radio = data["radio"]
-    radio["modulation"] = random.choice(("bpsk", "qpsk", "8psk", "16qam", "64qam"))
-    many = 2 if radio["modulation"] in ("16qam", "64qam") else 3
-    for name in ("base_station", "relay", "ground_user"):
-        radio[name]["antennas"] = random.randint(1, many)
-    return dump_yaml(data)
+STATIONS = ("base_station", "relay", "ground_user")
 
 
 def planned(text: str, limit: float) -> tuple[float, str, bool]:
     """Return the processor's seconds for a plan, what is told of it, and whether all is well."""
     with tempfile.TemporaryDirectory() as folder:
-        plan = Path(folder) / "plan.yaml"
+        plan, out = Path(folder) / "plan.yaml", Path(folder) / "mission.waypoints"
         plan.write_text(text)
-        program = "from faao_mav.cli.main import run; run()"
-        command = [sys.executable, "-c", program, str(plan), "--json", "--force"]
-        command += ["--out", str(Path(folder) / "mission.waypoints")]
+        command = [sys.executable, "-m", "faao_mav", str(plan), "--json", "--force", "--out"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         try:
             run = subprocess.run(
-                command, capture_output=True, text=True, check=False, timeout=limit
+                [*command, str(out)], capture_output=True, text=True, check=False, timeout=limit
             )
         except subprocess.TimeoutExpired:
             return limit, "no end", False
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    seconds = sum(getattr(after, key) - getattr(before, key) for key in ("ru_utime", "ru_stime"))
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     if not run.stdout.strip():
         return seconds, run.stderr.strip().splitlines()[-1], "Traceback" not in run.stderr
     told = json.loads(run.stdout)
@@ -61,6 +50,7 @@ def planned(text: str, limit: float) -> tuple[float, str, bool]:
 
 
 def main() -> int:
+    """Print a row for each plan, then the seconds of all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plans", default="0,200", metavar="FIRST,COUNT", help="seeds")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds of the world for each")
@@ -68,22 +58,21 @@ def main() -> int:
     first, count = map(int, asked.plans.split(","))
     costs, failed = [], 0
     for seed in range(first, first + count):
-        text = drawn(seed)
-        seconds, told, well = planned(text, asked.limit)
+        random, data = Random(1000 + seed), load_yaml(random_plan(seed), "drawn")
+        radio, flight = data["radio"], data["flight"]
+        radio["modulation"] = random.choice(("bpsk", "qpsk", "8psk", "16qam", "64qam"))
+        many = 2 if radio["modulation"] in ("16qam", "64qam") else 3
+        for name in STATIONS:
+            radio[name]["antennas"] = random.randint(1, many)
+        seconds, told, well = planned(dump_yaml(data), asked.limit)
         costs.append(seconds)
         failed += not well
-        data = load_yaml(text, "drawn")
-        radio, flight = data["radio"], data["flight"]
-        antennas = "/".join(
-            str(radio[name]["antennas"]) for name in ("base_station", "relay", "ground_user")
-        )
+        antennas = "/".join(str(radio[name]["antennas"]) for name in STATIONS)
         kind = f"{data['vehicle']['type']} {radio['modulation']} {antennas} {radio['fading']}"
         slots = round(flight["duration"] / flight["time_step"])
-        print(f"{seed:4d} {seconds:6.1f} s  {kind:32} {slots:4d} slots  {told}")
-        sys.stdout.flush()
+        print(f"{seed:4d} {seconds:6.1f} s  {kind:32} {slots:4d} slots  {told}", flush=True)
     median, most, nearly_all = np.percentile(costs, [50, 90, 99])
-    print(f"{median:.2f} s in the median, {most:.2f} s at 90 %, {nearly_all:.2f} s at 99 %")
-    print(f"{failed} failed")
+    print(f"{median:.2f}, {most:.2f}, {nearly_all:.2f} s at 50, 90 and 99 %; {failed} failed")
     return 1 if failed else 0
 
 

@@ -14,6 +14,8 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
@@ -28,41 +30,32 @@ from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
-from faao_mav.optimizer.rates.field import RateField, rate_field
+from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.ways import along, shortest_by
 
-PATIENCE = 60.0
-"""Processor seconds that the peer may take for one start."""
-
-_KEPT = 1e-4
-"""Violation of a limit, in its SI unit, that a flight of the peer may have."""
+PATIENCE, KEPT = 60.0, 1e-4
+"""What the peer may take for one start, s of the processor, and violate of a limit, SI units."""
 
 
-def random_starts(problem: Problem, count: int, rng: np.random.Generator) -> list[Trajectory]:
-    """Feasible flights, each by way of a place at random that time allows."""
-    area, kin = problem.free_area, problem.kinematics
+def random_starts(problem: Problem, tries: int) -> Iterator[Trajectory]:
+    """Yield feasible flights, each by way of a place at random that time allows."""
+    area, kin, rng = problem.free_area, problem.kinematics, np.random.default_rng(0)
     assert area is not None
     places = np.stack([kin.start, kin.end, *(link.gains.station for link in problem.links)])
-    low, high = places.min(axis=0) - 60, places.max(axis=0) + 60
-    flights: list[Trajectory] = []
-    for _ in range(20 * count):
-        place = rng.uniform(low, high)
-        way = (
-            shortest_by(area, [kin.start, place, kin.end]) if area.covers(place[None])[0] else None
-        )
+    for place in rng.uniform(places.min(axis=0) - 60, places.max(axis=0) + 60, (tries, 2)):
+        inside = area.covers(place[None])[0]
+        way = shortest_by(area, [kin.start, place, kin.end]) if inside else None
         flight = None if way is None else along(kin, way, problem.constraints(kin))
         if flight is not None:
-            flights.append(flight)
-        if len(flights) == count:
-            break
-    return flights
+            yield flight
 
 
-def by_ipopt(problem: Problem, field: RateField, flights: list[Trajectory]) -> tuple[float, int]:
+def by_ipopt(problem: Problem, flights: list[Trajectory]) -> tuple[float, int]:
     """Return the best that IPOPT delivers, and from how many starts it ends within the limits."""
     kin, relay, fence = problem.kinematics, problem.relay, problem.fence
     assert fence is not None
+    field = rate_field(problem, design(problem.plan))
     model, best, kept = None, 0.0, 0
     for flight in flights:
         rates = [
@@ -73,8 +66,7 @@ def by_ipopt(problem: Problem, field: RateField, flights: list[Trajectory]) -> t
         ]
         model = model or Model(kin, rates, PATIENCE, relay, fence)
         found = model.solve(rates, flight)
-        missed = max(*kin.residuals(found).values(), LENGTH * fence.excess(kin, found))
-        if missed < _KEPT:
+        if max(*kin.residuals(found).values(), LENGTH * fence.excess(kin, found)) < KEPT:
             kept += 1
             values = field.value(found.w.T)
             best = max(best, objective(values, kin, relay))
@@ -82,43 +74,35 @@ def by_ipopt(problem: Problem, field: RateField, flights: list[Trajectory]) -> t
 
 
 def main() -> None:
-    """Print the table, then which claims hold."""
+    """Print the table, then the least margin and ratio."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="parts of the names of scenarios")
+    parser.add_argument("names", nargs="*", default=[""], help="parts of the names of scenarios")
     parser.add_argument("--starts", type=int, default=20)
     parser.add_argument("--step", type=float, default=1.5)
     given = parser.parse_args()
-    print(
-        f"{'fence':36}{'direct':>9}{'s':>7}{'clear':>8}{'IPOPT':>9}{'s':>8}{'kept':>6}{'ratio':>9}"
-    )
-    least, nearest = np.inf, np.inf
+    print(f"{'fence':36}{'direct':>9}{'s':>7}{'clear':>8}{'IPOPT':>9}{'s':>8}{'kept':>6}  ratio")
+    ratios, clearances = [], []
     for name in FENCES:
-        if given.names and not any(part in name for part in given.names):
+        if not any(part in name for part in given.names):
             continue
         plan = fenced(name, **{"flight.time_step": given.step})
-        problem = build_problem(plan)
+        problem, area = build_problem(plan), plan.keep_in
+        assert area is not None
         began = time.process_time()
         ours = optimize(plan)
         took = time.process_time() - began
-        area = plan.keep_in
-        assert area is not None
-        clear = area.clearance(dense_path(ours.w, ours.v, ours.a, given.step))
-        nearest = min(nearest, clear)
-        flights = random_starts(problem, given.starts, np.random.default_rng(0))
+        clearances.append(area.clearance(dense_path(ours.w, ours.v, ours.a, given.step)))
+        flights = list(islice(random_starts(problem, 20 * given.starts), given.starts))
         began = time.process_time()
-        best, kept = by_ipopt(problem, rate_field(problem, design(plan)), flights)
+        best, kept = by_ipopt(problem, flights)
         seconds = time.process_time() - began
-        least = min(least, ours.delivered_rate / best) if kept else least
+        ratios.append(ours.delivered_rate / best if kept else np.nan)
         print(
-            f"{name:36}{ours.delivered_rate:9.4f}{took:7.1f}{clear:8.3f}{best:9.4f}{seconds:8.1f}"
-            f"{kept:3}/{len(flights)}{ours.delivered_rate / best if kept else np.nan:9.5f}",
+            f"{name:36}{ours.delivered_rate:9.4f}{took:7.1f}{clearances[-1]:8.3f}{best:9.4f}"
+            f"{seconds:8.1f}{kept:3}/{len(flights)}{ratios[-1]:9.5f}",
             flush=True,
         )
-    for claim, met, figure in (
-        ("the margin of 5 m is kept", nearest >= 5 - 1e-6, f"least {nearest:.4f} m"),
-        ("at least IPOPT's best less 0.1 %", least >= 0.999, f"least ratio {least:.5f}"),
-    ):
-        print(f"{'met' if met else 'MISSED':8}{claim}: {figure}")
+    print(f"least margin {min(clearances):.4f} m, of 5; least ratio {np.nanmin(ratios):.5f}")
 
 
 if __name__ == "__main__":

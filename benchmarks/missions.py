@@ -15,75 +15,45 @@ from random import Random
 from typing import Any
 
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.plan import Plan, parse_plan
-from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+from faao_mav.plan import Plan, read_plan
 from faao_mav.schedule.conversion import convert
 from faao_mav.schedule.prediction import price_flight
 
 SAMPLE = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
 
+
+def _changes(
+    duration: float, speed: float, start: list[int], end: list[int], user: list[int], height: float
+) -> dict[str, Any]:
+    return {
+        "flight.duration": duration,
+        "vehicle.max_speed": speed,
+        "flight.start": start,
+        "flight.end": end,
+        "radio.ground_user.position": user,
+        "flight.altitude": height,
+    }
+
+
 PLANS: dict[str, dict[str, Any]] = {
     "copter_relay, 120 s, 8 m/s": {},
-    "short, 60 s, 6 m/s": {
-        "flight.duration": 60,
-        "vehicle.max_speed": 6,
-        "flight.start": [0, 200],
-        "flight.end": [200, 0],
-        "radio.ground_user.position": [200, 200],
-    },
-    "slow, 90 s, 4 m/s": {
-        "flight.duration": 90,
-        "vehicle.max_speed": 4,
-        "flight.start": [0, 150],
-        "flight.end": [150, 0],
-        "radio.ground_user.position": [250, 250],
-    },
-    "two hovers, 200 s, 9 m/s": {
-        "flight.duration": 200,
-        "vehicle.max_speed": 9,
-        "vehicle.max_acceleration": 2.0,
-    },
-    "two hovers, 300 s, 7 m/s": {
-        "flight.duration": 300,
-        "vehicle.max_speed": 7,
-        "radio.ground_user.position": [600, 500],
-        "flight.end": [500, 0],
-    },
-    "curved, 100 s, 7 m/s": {
-        "flight.duration": 100,
-        "vehicle.max_speed": 7,
-        "radio.ground_user.position": [350, 300],
-        "flight.altitude": 60,
-    },
-    "curved, 75 s, 8 m/s": {
-        "flight.duration": 75,
-        "flight.start": [-50, 250],
-        "flight.end": [250, -50],
-        "flight.altitude": 50,
-    },
-    "curved, 150 s, 8 m/s": {
-        "flight.duration": 150,
-        "flight.start": [-200, 350],
-        "flight.end": [350, -200],
-        "flight.altitude": 60,
-        "radio.ground_user.position": [400, 400],
-        "radio.relay.noise_dbm": -85,
-        "radio.ground_user.noise_dbm": -85,
-    },
+    "short, 60 s, 6 m/s": _changes(60, 6, [0, 200], [200, 0], [200, 200], 100),
+    "slow, 90 s, 4 m/s": _changes(90, 4, [0, 150], [150, 0], [250, 250], 100),
+    "two hovers, 200 s, 9 m/s": _changes(200, 9, [0, 350], [350, 0], [300, 300], 100)
+    | {"vehicle.max_acceleration": 2.0},
+    "two hovers, 300 s, 7 m/s": _changes(300, 7, [0, 350], [500, 0], [600, 500], 100),
+    "curved, 100 s, 7 m/s": _changes(100, 7, [0, 350], [350, 0], [350, 300], 60),
+    "curved, 75 s, 8 m/s": _changes(75, 8, [-50, 250], [250, -50], [300, 300], 50),
+    "curved, 150 s, 8 m/s": _changes(150, 8, [-200, 350], [350, -200], [400, 400], 60)
+    | {"radio.relay.noise_dbm": -85, "radio.ground_user.noise_dbm": -85},
 }
+"""Changes of the sample plan, by dotted keys."""
 
 
 def plan_of(changes: dict[str, Any], autopilot: str, parameters: str) -> Plan:
     """Return the sample plan with the dotted keys of `changes` replaced."""
-    data = load_yaml(SAMPLE.read_text(), "test")
-    changes = changes | {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
-    for path, value in changes.items():
-        *parents, last = path.split(".")
-        section = data
-        for key in parents:
-            section = section[key]
-        section[last] = value
-    return parse_plan(dump_yaml(data))
+    whose = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
+    return read_plan(SAMPLE).changed(changes | whose)
 
 
 def random_changes(seed: int) -> dict[str, Any]:
@@ -97,16 +67,12 @@ def random_changes(seed: int) -> dict[str, Any]:
         return [round(random.uniform(-reach, reach)) for _ in range(2)]
 
     ends = ["free" if random.random() < 0.2 else "hover" for _ in range(2)]
-    return {
-        "flight.duration": duration,
-        "flight.start": place(reach),
-        "flight.end": place(reach),
-        "flight.altitude": random.choice((40, 60, 80, 100, 120)),
+    start, end, height = place(reach), place(reach), random.choice((40, 60, 80, 100, 120))
+    acceleration = round(random.uniform(0.8, 2.5), 1)
+    return _changes(duration, speed, start, end, place(500.0), height) | {
         "flight.start_velocity": ends[0],
         "flight.end_velocity": ends[1],
-        "vehicle.max_speed": speed,
-        "vehicle.max_acceleration": round(random.uniform(0.8, 2.5), 1),
-        "radio.ground_user.position": place(500.0),
+        "vehicle.max_acceleration": acceleration,
         "radio.modulation": random.choice(("bpsk", "qpsk", "8psk", "16qam")),
         "radio.relay.noise_dbm": random.choice((-80, -85, -91)),
     }
@@ -119,16 +85,13 @@ def main() -> None:
     parser.add_argument("--keep", action="store_true", help="the autopilot's default parameters")
     parser.add_argument("--random", metavar="FIRST,COUNT", help="plans drawn from these seeds")
     options = parser.parse_args()
-    plans = PLANS
-    if options.random:
-        first, count = map(int, options.random.split(","))
-        plans = {f"random {seed}": random_changes(seed) for seed in range(first, first + count)}
-    autopilot = "px4" if options.px4 else "ardupilot"
-    parameters = "keep" if options.keep else "recommend"
-    print(f"{autopilot}, {parameters}")
+    first, count = map(int, (options.random or "0,0").split(","))
+    drawn = {f"random {seed}": random_changes(seed) for seed in range(first, first + count)}
+    whose = "px4" if options.px4 else "ardupilot", "keep" if options.keep else "recommend"
+    print(", ".join(whose))
     print(f"{'plan':28}      s  items   rms    max   path    late    rate")
-    for name, changes in plans.items():
-        plan = plan_of(changes, autopilot, parameters)
+    for name, changes in (drawn or PLANS).items():
+        plan = plan_of(changes, *whose)
         solution = optimize(plan)
         started = time.process_time()
         conversion = convert(solution)
