@@ -51,23 +51,6 @@ _DRAWING_STEP = 1.0
 """Seconds between the samples of a drawn flight; chosen: a drawing needs no more."""
 
 
-@dataclass(frozen=True, slots=True)
-class FenceSummary:
-    """A fence of so many `areas`, and how near flights come to its edge, m; below 0 outside.
-
-    `zones` say of each whether it is one to stay in or out of, with its name; `notes` what of the
-    fence's file was passed over. `margin` is what the plan is to keep, `planned_clearance` what it
-    keeps, `predicted_clearance` what the whole predicted flight keeps, None without one.
-    """
-
-    areas: int
-    zones: tuple[str, ...]
-    notes: tuple[str, ...]
-    margin: float
-    planned_clearance: float
-    predicted_clearance: float | None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
     """What a plan led to.
@@ -112,20 +95,26 @@ class Result:
         return self.check.findings if self.check is not None else ()
 
     @property
-    def fence(self) -> "FenceSummary | None":
-        """How the flight keeps the plan's fence; None without one."""
+    def fence(self) -> dict[str, Any] | None:
+        """How near flights come to the edge of the plan's fence, as in `--json`; None without one.
+
+        `zones` say of each of the `areas` whether it is one to stay in or out of, with its name;
+        `notes` what of the fence's file was passed over. `margin` is what the plan is to keep,
+        `planned_clearance` what it keeps, `predicted_clearance` what the whole predicted flight
+        keeps, None without one: m, below 0 outside.
+        """
         plan, area = self.solution.plan, self.solution.plan.keep_in
         if area is None or plan.fence is None:
             return None
         track = self.check.track if self.check is not None else None
-        return FenceSummary(
-            areas=len(plan.zones),
-            zones=tuple(zone.name for zone in plan.zones),
-            notes=plan.geofence.notes,
-            margin=plan.fence.margin,
-            planned_clearance=area.clearance(self.solution.w),
-            predicted_clearance=area.clearance(track.position[:, :2]) if track else None,
-        )
+        return {
+            "areas": len(plan.zones),
+            "zones": [zone.name for zone in plan.zones],
+            "notes": list(plan.geofence.notes),
+            "margin": plan.fence.margin,
+            "planned_clearance": area.clearance(self.solution.w),
+            "predicted_clearance": area.clearance(track.position[:, :2]) if track else None,
+        }
 
     @property
     def flyable(self) -> bool:
@@ -223,7 +212,7 @@ class Result:
             else None,
             "wind": asdict(plan.site.wind),
             "energy": self.check.energy.as_dict() if self.check and self.check.energy else None,
-            "fence": asdict(self.fence) if self.fence else None,
+            "fence": self.fence,
             "validation": [asdict(finding) for finding in self.findings],
         }
 

@@ -322,12 +322,13 @@ def _energy(check: Check | None) -> Iterator[Line]:
 def _fenced(result: Result) -> Iterator[Line]:
     if (fence := result.fence) is None:
         return
-    kept = f"the plan keeps {fence.planned_clearance:.1f} m (margin {fence.margin:g} m)"
-    if fence.predicted_clearance is not None:
-        kept += f", the predicted flight {fence.predicted_clearance:.1f} m"
-    more = f" and {fence.areas - _MOST_ZONES} more" if fence.areas > _MOST_ZONES else ""
-    yield "fence", f"{', '.join(fence.zones[:_MOST_ZONES])}{more}"
-    yield from (("", note) for note in fence.notes)
+    zones = fence["zones"]
+    more = f" and {len(zones) - _MOST_ZONES} more" if len(zones) > _MOST_ZONES else ""
+    yield "fence", f"{', '.join(zones[:_MOST_ZONES])}{more}"
+    yield from (("", note) for note in fence["notes"])
+    kept = f"the plan keeps {fence['planned_clearance']:.1f} m (margin {fence['margin']:g} m)"
+    if fence["predicted_clearance"] is not None:
+        kept += f", the predicted flight {fence['predicted_clearance']:.1f} m"
     yield "", f"{kept} from the edge"
 
 
