@@ -1,4 +1,4 @@
-"""A study runs, is interrupted, goes on, and fails in parts."""
+"""A study runs, is interrupted, goes on, fails in parts, and is drawn."""
 
 import csv
 import json
@@ -17,6 +17,7 @@ from full_disk import files_of_at_most
 from planted import plant
 from typer.testing import CliRunner
 
+from faao_mav import optimize, price
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
@@ -27,6 +28,7 @@ from faao_mav.study.rows import comparison
 
 QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
 CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
+Whole = tuple[Path, tuple[StudyRow, ...]]
 
 CALL = """
 import os
@@ -59,14 +61,12 @@ def plan(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, tuple[StudyRow, ...]]:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     directory = tmp_path_factory.mktemp("whole")
     return directory, run_study(CASES, jobs=1, directory=directory)
 
 
-def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
-    from faao_mav import optimize, price
-
+def test_a_row_is_what_the_plan_gives(whole: Whole) -> None:
     row, solution = whole[1][2], optimize(parse_plan(CASES[2].text))
     assert (row.values, row.scheme) == ({"power_dbm": 10}, "faao")
     assert row.R_avg == solution.rates.R_avg == min(row.R_U or 0, row.R_G or 0)
@@ -78,9 +78,7 @@ def test_a_row_is_what_the_plan_gives(whole: tuple[Path, tuple[StudyRow, ...]]) 
     assert comparison([other]).startswith("R_avg, bit/s/Hz of mutual information\n")
 
 
-def test_a_resumed_study_is_the_uninterrupted_one(
-    tmp_path: Path, whole: tuple[Path, tuple[StudyRow, ...]]
-) -> None:
+def test_a_resumed_study_is_the_uninterrupted_one(tmp_path: Path, whole: Whole) -> None:
     seen: list[StudyRow] = []
 
     def stop(row: StudyRow) -> None:
@@ -101,30 +99,8 @@ def test_a_resumed_study_is_the_uninterrupted_one(
     assert [row["scheme"] for row in table_in(tmp_path)] == (["faao", "mrt"] * 3)
 
 
-def test_processes_do_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
+def test_processes_and_a_cluster_do_not_change_the_result(whole: Whole) -> None:
     assert timeless(run_study(CASES, jobs=2)) == timeless(whole[1])
-
-
-def test_modules_beside_the_plan_are_not_run(plan: Path) -> None:
-    ran = plant(plan.parent)
-    command = [str(Path(sys.executable).with_name("faao-mission")), "study", plan.name]
-    more = ["--power", "0,10", "--jobs", "2"]
-    study = subprocess.run(
-        [*command, *more], cwd=plan.parent, capture_output=True, text=True, check=False
-    )
-    assert (study.returncode, study.stderr) == (0, "")
-    assert not ran.exists()
-    script = plan.parent / "elsewhere" / "call.py"
-    script.parent.mkdir()
-    script.write_text(CALL)
-    called = subprocess.run(
-        [sys.executable, script], cwd=plan.parent, capture_output=True, text=True, check=False
-    )
-    assert (called.stdout, called.stderr) == ("2 False\n", "")
-    assert not ran.exists()
-
-
-def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[StudyRow, ...]]) -> None:
     local = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": None}
     start: Any = LocalCluster
     with start(n_workers=1, threads_per_worker=1, processes=False, **local) as cluster:
@@ -132,14 +108,42 @@ def test_a_cluster_does_not_change_the_result(whole: tuple[Path, tuple[StudyRow,
     assert timeless(rows) == timeless(whole[1])
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense://x"])
-def test_a_cluster_that_is_not_there(
-    plan: Path, address: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_modules_beside_the_plan_are_not_run(plan: Path) -> None:
+    ran = plant(plan.parent)
+    script = plan.parent / "elsewhere" / "call.py"
+    script.parent.mkdir()
+    script.write_text(CALL)
+    command = [Path(sys.executable).with_name("faao-mission"), "study", plan.name]
+    for each in ([*command, "--power", "0,10", "--jobs", "2"], [sys.executable, script]):
+        done = subprocess.run(each, cwd=plan.parent, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert not ran.exists()
+    assert done.stdout == "2 False\n"
+
+
+def test_what_is_refused(plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("faao_mav.study.runner._CONNECTING", 0.5)
-    result = run(plan, "--cluster", address)
-    assert result.exit_code == 2
-    assert f"cluster {address}: no scheduler there" in result.stderr
+    for told, *arguments in (
+        ("cluster tcp://127.0.0.1:1: no scheduler there", "--cluster", "tcp://127.0.0.1:1"),
+        ("cluster nonsense://x: no scheduler there", "--cluster", "nonsense://x"),
+        ("radio.modulation: 'fsk' is not accepted", "--vary", "radio.modulation=fsk,ook"),
+        ("did you mean flight.duration?", "--vary", "flight.duraton=10"),
+        ("varied twice", "--vary", "flight.altitude=50", "--vary", "flight.altitude=60"),
+        ("varied twice", "--power", "10", "--vary", "radio.relay.power_dbm=20"),
+        ("--jobs 0: give", "--jobs", 0),
+        ("--points 3: is for a frontier", "--points", 3),
+    ):
+        result = run(plan, *arguments, "--out", tmp_path / "out")
+        assert result.exit_code == 2, result.output
+        assert told in result.stderr
+    assert not (tmp_path / "out" / "rows.jsonl").exists()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file: is a file; give a directory"):
+        run_study(CASES, jobs=1, directory=tmp_path / "file")
+    (tmp_path / "table.csv").mkdir()
+    with pytest.raises(InputError, match=r"table\.csv: is a directory"):
+        run_study(CASES, jobs=1, directory=tmp_path)
+    assert not (tmp_path / "rows.jsonl").exists()
 
 
 def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> None:
@@ -151,19 +155,6 @@ def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> No
     assert "too short" in short["error"]
     assert short["R_avg"] == good["error"] == ""
     assert float(good["R_avg"]) > 0
-
-
-def test_a_study_in_which_nothing_can_run_is_refused(plan: Path, tmp_path: Path) -> None:
-    result = run(plan, "--vary", "radio.modulation=fsk,ook", "--out", tmp_path / "out")
-    assert result.exit_code == 2
-    assert "radio.modulation: 'fsk' is not accepted" in result.stderr
-    assert not (tmp_path / "out").exists()
-    mistyped = run(plan, "--vary", "flight.duraton=10")
-    assert mistyped.exit_code == 2
-    assert "did you mean flight.duration?" in mistyped.stderr
-
-
-def test_a_study_without_any_result_says_so(plan: Path) -> None:
     plan.write_text(edited(QUICK, {"radio.fading": "ergodic"}))
     result = run(plan, "--schemes", "algorithm1", "--jobs", 1)
     assert result.exit_code == 1
@@ -171,7 +162,9 @@ def test_a_study_without_any_result_says_so(plan: Path) -> None:
     assert "ergodic" in result.stdout
 
 
-def test_options_go_before_the_plans_study(plan: Path, tmp_path: Path) -> None:
+def test_options_go_before_the_plans_study_of_which_the_main_job_takes_no_notice(
+    plan: Path, tmp_path: Path
+) -> None:
     study = {"vary": {"power_dbm": [0, 10]}, "schemes": ["faao"], "seeds": 2}
     plan.write_text(edited(QUICK, {"study": study}))
     rows = json.loads(run(plan, "--json", "--jobs", 1).stdout)["rows"]
@@ -179,23 +172,18 @@ def test_options_go_before_the_plans_study(plan: Path, tmp_path: Path) -> None:
     other = run(plan, "--power", "5", "--seeds", 1, "--schemes", "zf", "--json", "--jobs", 1)
     rows = json.loads(other.stdout)["rows"]
     assert [(row["power_dbm"], row["scheme"], row["seed"]) for row in rows] == [(5, "zf", 0)]
-
-
-def test_the_main_job_takes_no_notice_of_a_study(plan: Path, tmp_path: Path) -> None:
     written = []
-    for study in ({}, {"study": {"vary": {"flight.duration": [20]}, "seeds": 3}}):
-        plan.write_text(edited(QUICK, {"vehicle.max_speed": 10} | study))
+    for section in ({}, {"study": study}):
+        plan.write_text(edited(QUICK, {"vehicle.max_speed": 10} | section))
         out = tmp_path / "m.waypoints"
-        result = CliRunner().invoke(app, [str(plan), "--out", str(out), "--quiet"])
-        assert result.exit_code == 0, result.output
+        assert CliRunner().invoke(app, [str(plan), "--out", str(out), "--quiet"]).exit_code == 0
         written.append(out.read_bytes())
     assert written[0] == written[1]
 
 
-def test_what_is_no_row_is_refused_by_its_line(
-    whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path
-) -> None:
+def test_what_is_no_row_is_refused_by_its_line(whole: Whole, tmp_path: Path) -> None:
     first, second, *_ = (whole[0] / "rows.jsonl").read_text().splitlines()
+    rows = tmp_path / "rows.jsonl"
     for changes, said in (
         ({"scheme": None}, "scheme: Input should be a valid string"),
         ({"seed": "0"}, "seed: Input should be a valid integer"),
@@ -205,24 +193,17 @@ def test_what_is_no_row_is_refused_by_its_line(
         ({"more": 1}, "more: Unexpected keyword argument"),
     ):
         edit = json.dumps(json.loads(second) | cast(dict[str, Any], changes))
-        (tmp_path / "rows.jsonl").write_text(f"{first}\n{edit}\n")
+        rows.write_text(f"{first}\n{edit}\n")
         with pytest.raises(InputError, match=rf"rows\.jsonl: line 2: no row of a study: {said}"):
             run_study(CASES, jobs=1, directory=tmp_path)
-    for line in (
-        b'{"not": "a row"}',
-        b"[" * 100_000,
-        b'{"key": "\xff"}',
-        b"1",
-        b"",
-        b"9" * 5_000_000,
-    ):
-        (tmp_path / "rows.jsonl").write_bytes(line + b"\n")
+    for line in (b'{"not": "a row"}', b"[" * 100_000, b'{"key": "\xff"}', b"1", b"", b"9" * 10**6):
+        rows.write_bytes(line + b"\n")
         with pytest.raises(InputError, match="line 1: no row of a study"):
             load_rows(tmp_path, CASES)
-    (tmp_path / "rows.jsonl").write_text("notes without a line's end")
+    rows.write_text("notes without a line's end")
     with pytest.raises(InputError, match="its last line is no row of a study"):
         run_study(CASES, jobs=1, directory=tmp_path)
-    assert (tmp_path / "rows.jsonl").read_text() == "notes without a line's end"
+    assert rows.read_text() == "notes without a line's end"
 
 
 def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_path: Path) -> None:
@@ -235,19 +216,9 @@ def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_pat
     assert again.route.tolist() == first.route.tolist()
 
 
-def test_what_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="file: is a file; give a directory"):
-        run_study(CASES, jobs=1, directory=tmp_path / "file")
-    (tmp_path / "table.csv").mkdir()
-    with pytest.raises(InputError, match=r"table\.csv: is a directory"):
-        run_study(CASES, jobs=1, directory=tmp_path)
-    assert not (tmp_path / "rows.jsonl").exists()
-
-
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
-    tmp_path: Path, whole: tuple[Path, tuple[StudyRow, ...]], jobs: int, plan: Path
+    tmp_path: Path, whole: Whole, jobs: int, plan: Path
 ) -> None:
     path = tmp_path / "out" / "rows.jsonl"
     arguments = (plan, "--power", "0,10,20", "--schemes", "faao,mrt", "--out", path.parent)
@@ -267,27 +238,47 @@ def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
     assert timeless(load_rows(path.parent, CASES)) == timeless(whole[1])
 
 
-def test_a_key_varied_twice_is_refused(plan: Path) -> None:
-    for options in (
-        ("--vary", "flight.altitude=50", "--vary", "flight.altitude=60"),
-        ("--power", "10", "--vary", "radio.relay.power_dbm=20"),
-    ):
-        result = run(plan, *options)
-        assert result.exit_code == 2
-        assert "varied twice" in result.stderr
-
-
-def test_figures_are_written_and_labelled(plan: Path, tmp_path: Path) -> None:
+def test_rates_and_routes_are_drawn_the_same_each_time(
+    plan: Path, whole: Whole, tmp_path: Path
+) -> None:
+    name = "中 $\\frac"
+    plan.write_text(edited(QUICK, {"name": name}))
     out = tmp_path / "out"
-    arguments = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--out", out)
+    arguments = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--seeds", 2, "--out", out)
     assert run(*arguments, "--jobs", 1).exit_code == 0
     drawn = (out / "figure.svg").read_text()
-    for text in ("power W of both stations, dBm", "delivered rate R_del, bit/s/Hz", "FAAO", "MRT"):
+    for text in (name, "power W of both stations, dBm", "delivered rate R_del, bit/s/Hz", "FAAO"):
         assert text in drawn
     assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
-    again = (out / "figure.svg").read_bytes()
     assert run(*arguments, "--jobs", 1).exit_code == 0
-    assert (out / "figure.svg").read_bytes() == again
+    assert (out / "figure.svg").read_text() == drawn
+    figure = study_figure(whole[1], parse_plan(plan.read_text()), "trajectories")
+    save_figure(figure, tmp_path / "f.pdf")
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("east, m", "north, m")
+    names = {text.get_text() for text in axes.texts}
+    assert names == {"base station", "user", "start", "end"}
+    failed = (StudyRow("k", {"power_dbm": 1}, "faao", 0, error="no"),)
+    with pytest.raises(InputError, match="nothing to draw"):
+        study_figure(failed, parse_plan(QUICK), "trajectories")
+
+
+def test_what_causality_costs_is_drawn() -> None:
+    vary = {"flight.duration": (10, 12), "radio.causal": (True, False)}
+    rows = run_study(make_cases(QUICK, vary=vary), jobs=1)
+    assert not any(row.error for row in rows)
+    by = {(row.values["flight.duration"], row.values["radio.causal"]): row for row in rows}
+    for duration in (10, 12):
+        planned, paper = by[duration, True].delivered, by[duration, False].delivered
+        assert planned is not None
+        assert paper is not None
+        assert planned >= paper - 1e-4
+    (plot,) = study_figure(rows, parse_plan(SMALL), "delivered").axes
+    assert [line.get_label() for line in plot.lines] == [
+        "R_avg, planned for it",
+        "delivered, planned for it",
+        "delivered, planned for R_avg",
+    ]
 
 
 def test_positions_in_degrees_are_varied_and_compared(plan: Path) -> None:
@@ -295,25 +286,6 @@ def test_positions_in_degrees_are_varied_and_compared(plan: Path) -> None:
     result = run(plan, "--vary", vary, "--jobs", 1)
     assert result.exit_code == 0, result.output
     assert '{"latitude": -35.3629, "longitude": 149.1652}' in result.stdout
-
-
-def test_routes_are_drawn_on_a_map(
-    whole: tuple[Path, tuple[StudyRow, ...]], tmp_path: Path
-) -> None:
-    name = "中 $\\frac"
-    figure = study_figure(whole[1], parse_plan(edited(QUICK, {"name": name})), "trajectories")
-    save_figure(figure, tmp_path / "f.svg")
-    assert name in (tmp_path / "f.svg").read_text()
-    (axes,) = figure.axes
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("east, m", "north, m")
-    names = [text.get_text() for text in axes.texts]
-    assert {"base station", "user", "start", "end"} <= set(names)
-
-
-def test_without_results_there_is_nothing_to_draw() -> None:
-    failed = (StudyRow("k", {"power_dbm": 1}, "faao", 0, error="no"),)
-    with pytest.raises(InputError, match="nothing to draw"):
-        study_figure(failed, parse_plan(QUICK), "trajectories")
 
 
 def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> None:
