@@ -114,7 +114,11 @@ def test_modules_beside_the_plan_are_not_run(plan: Path) -> None:
     script.parent.mkdir()
     script.write_text(CALL)
     command = [Path(sys.executable).with_name("faao-mission"), "study", plan.name]
-    for each in ([*command, "--power", "0,10", "--jobs", "2"], [sys.executable, script]):
+    calls: list[list[Any]] = [
+        [*command, "--power", "0,10", "--jobs", "2"],
+        [sys.executable, script],
+    ]
+    for each in calls:
         done = subprocess.run(each, cwd=plan.parent, capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")
         assert not ran.exists()
