@@ -34,7 +34,7 @@ from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.slot_rate import FixedRate
 from faao_mav.optimizer.search.bound import Bound, upper_bound
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 

@@ -32,7 +32,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.rates.table_rate import TableRate
-from faao_mav.optimizer.search.ways import along, shortest_by
+from faao_mav.optimizer.search.starts import along, shortest_by
 
 PATIENCE, KEPT = 60.0, 1e-4
 """What the peer may take for one start, s of the processor, and violate of a limit, SI units."""

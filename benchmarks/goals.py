@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import ENERGY_SHARE
@@ -27,10 +26,9 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
-from faao_mav.optimizer.search.sparing import sparing_starts
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.starts import shortest_by, sparing_starts
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.track import nearest_flight
-from faao_mav.optimizer.search.ways import shortest_by
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import read_plan
 from faao_mav.plan.fields import dbm
@@ -104,10 +102,9 @@ def from_random(problem: Problem, count: int) -> float:
     reach, reached = float(np.linalg.norm(kin.end - kin.start)), list[float]()
     for _ in range(TRIES * count):
         places = list((kin.start + kin.end) / 2 + rng.uniform(-reach, reach, (2, 2)))
-        way: Real | None = np.array([kin.start, *places, kin.end])
         if area is not None:
-            stops = [area.nearest(place, kin.start) for place in places]
-            way = shortest_by(area, [kin.start, *stops, kin.end])
+            places = [area.nearest(place, kin.start) for place in places]
+        way = shortest_by(area, [kin.start, *places, kin.end])
         if way is None:
             continue
         share = np.sort(np.append(rng.uniform(0, 1, len(way) - 2), (0.0, 1.0)))

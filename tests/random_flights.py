@@ -3,7 +3,7 @@
 import numpy as np
 
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 
 
 def random_flight(kin: Kinematics, seed: int) -> Trajectory:

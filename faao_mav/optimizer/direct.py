@@ -34,10 +34,8 @@ from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_starts, stretched
-from faao_mav.optimizer.search.sparing import sparing_starts
-from faao_mav.optimizer.search.starts import by_name, starts
+from faao_mav.optimizer.search.starts import sparing_starts, starts
 from faao_mav.optimizer.search.track import nearest_flight
-from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.rate_steps import RateSteps
@@ -164,12 +162,8 @@ def _routes(
     """
     kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
     stations = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
-    names = ("straight",) if alone else by_name(problem.plan.optimizer.starts)
-    routes = (
-        starts_inside(kin, names, stations, problem.free_area, fenced)
-        if problem.free_area
-        else starts(kin, names, stations)
-    )
+    names = ("straight",) if alone else problem.plan.optimizer.starts
+    routes = starts(kin, names, stations, problem.free_area, fenced)
     if before is not None:
         routes["cutoff"] = before.trajectory
     if known is not None:

@@ -23,7 +23,7 @@ import numpy as np
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Least, Observer, Solution, staged
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots

@@ -13,11 +13,9 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize
 from faao_mav.optimizer.interior.search import WARM_START
-from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.search.starts import straight_flight
-from faao_mav.optimizer.search.ways import starts_inside
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan
 from faao_mav.radio.relay import Relayed
 
@@ -67,7 +65,8 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     problem = build_problem(plan)
     kin, field = problem.kinematics, rate_field(problem, design(plan))
     kept = problem.constraints(kin)
-    start, warm, slow = _start(problem), False, kin.min_speed > 0
+    start = next(iter(starts(kin, ("straight",), {}, problem.free_area, kept).values()))
+    warm, slow = False, kin.min_speed > 0
     if near is not None and near.shape == start.v.shape:
         nearer = feasible(kin, start, near, (*constraints_of(kin), *kept))
         start, warm = nearer, nearer is not start
@@ -84,12 +83,3 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     I_U, I_G = field.value(best.w.T)
     t = np.asarray(kin.time_step * np.arange(kin.slots))
     return RoughFlight(plan, t, best.w, best.v, I_U, I_G)
-
-
-def _start(problem: Problem) -> Trajectory:
-    """Return the straight flight, or inside a fence one along the shortest way."""
-    kin, area = problem.kinematics, problem.free_area
-    if area is None:
-        return straight_flight(kin)
-    ways = starts_inside(kin, ("straight",), {}, area, problem.constraints(kin))
-    return next(iter(ways.values()))

@@ -14,7 +14,7 @@ from faao_mav.optimizer.interior.constraint import A, Constraint, Rows, V, W
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.scaled import FlightVariables, flight_variables
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 
 STAGE = links(bowl, 1e-5, 3e-5)
 

@@ -15,9 +15,9 @@ from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.starts import starts
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.track import nearest_flight
-from faao_mav.optimizer.search.ways import starts_inside
 from faao_mav.optimizer.solution import Solution, load_solution, save_solution
 from faao_mav.plan import Plan
 
@@ -160,7 +160,7 @@ def test_both_ways_round_are_starts() -> None:
     problem = build_problem(fenced("a circle on the straight line", **QUICK))
     assert problem.free_area is not None
     kin = problem.kinematics
-    flights = starts_inside(kin, ["straight"], {}, problem.free_area, problem.constraints(kin))
+    flights = starts(kin, ["straight"], {}, problem.free_area, problem.constraints(kin))
     sides = {
         float(np.sign((flight.w.sum(axis=1) - 340)[len(flight.w) // 2]))
         for flight in flights.values()

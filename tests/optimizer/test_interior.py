@@ -21,7 +21,7 @@ from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValue
 from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.scaled import flight_variables
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.power import FixedWing, RotaryWing
 from faao_mav.radio.relay import RelayQueue
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 
 
 def make(**changes: Any) -> Kinematics:

@@ -19,7 +19,7 @@ from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.bound import radial_rates
 from faao_mav.optimizer.search.map_bound import MapBound, RadialRates, map_bound
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import Cells, cells_of
 from faao_mav.plan import parse_plan
 

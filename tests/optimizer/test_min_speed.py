@@ -16,7 +16,8 @@ from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.search.starts import starts, straight_flight
+from faao_mav.optimizer.search.starts import starts
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.plan import Vector, parse_plan
 from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result

@@ -20,7 +20,7 @@ from faao_mav.optimizer.search.multistart import (
     BlockStage,
     improve_starts,
 )
-from faao_mav.optimizer.search.starts import by_name, starts
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan, parse_plan
 
 NAMED = ["straight", "bs", "user", "bs-user", "user-bs"]
@@ -41,7 +41,7 @@ def long_plan(power: int, starts: list[str]) -> Plan:
 def starts_of(problem: Problem) -> dict[str, Trajectory]:
     """Return the flights that the plan starts from."""
     stations = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
-    return starts(problem.kinematics, by_name(problem.plan.optimizer.starts), stations)
+    return starts(problem.kinematics, problem.plan.optimizer.starts, stations)
 
 
 def test_a_block_has_the_mean_of_its_slots() -> None:

@@ -19,7 +19,7 @@ from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.scaled import flight_variables
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import parse_plan
 from faao_mav.radio.relay import RelayQueue

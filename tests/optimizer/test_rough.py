@@ -7,8 +7,6 @@ import pytest
 from conftest import FLYABLE, edited
 
 from faao_mav import parse_plan
-from faao_mav.optimizer import rough
-from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates import table_rate
@@ -60,4 +58,3 @@ def test_plans_with_other_stations_share_their_tables(monkeypatch: pytest.Monkey
 def test_a_flight_of_another_length_is_no_start() -> None:
     plan = parse_plan(BASE)
     assert rough_flight(plan, np.zeros((5, 2))).w.shape == (28, 2)
-    assert isinstance(rough._start(build_problem(plan)), Trajectory)

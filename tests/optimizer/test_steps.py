@@ -15,7 +15,7 @@ from faao_mav.optimizer.algorithm1.trajectory_step import (
     xi,
 )
 from faao_mav.optimizer.problem import Problem, build_problem
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 
 
 def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:

@@ -15,7 +15,8 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.optimizer.search.bound import upper_bound
-from faao_mav.optimizer.search.starts import even_speed, starts, straight_flight
+from faao_mav.optimizer.search.starts import starts
+from faao_mav.optimizer.search.straight import even_speed, straight_flight
 from faao_mav.optimizer.search.track import Closeness
 from faao_mav.plan import Wind
 from missions import plan_of

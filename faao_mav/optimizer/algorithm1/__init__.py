@@ -31,7 +31,7 @@ from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
 from faao_mav.optimizer.algorithm1.trajectory_step import link_sum, optimize_trajectory
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.search.starts import straight_flight
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.precoder import SCHEMES
 

@@ -3,9 +3,8 @@
 The problem is not concave: the interior-point method finds the local optimum near its start.
 
 - `sweep`: dynamic programming over the map, by position alone.
-- `starts`: feasible flights to start from, straight and by way of the stations; `cruise` makes them
-  for aircraft with a least speed. A new start is a name in the plan's `optimizer.starts` and a
-  branch of `starts.starts`.
+- `starts`: feasible flights to start from, straight and by way of the stations, inside a fence or
+  not, made of the legs of `straight`, or of `cruise` for aircraft with a least speed.
 - `multistart`: improves all of them roughly and chooses those to improve to the end.
 - `bound`: an upper bound on what is maximised, over all flights and precoders: by `map_bound`
   (a price on both hops and a sweep) or `axis_bound` (place and speed along the line of the

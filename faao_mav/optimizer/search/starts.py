@@ -1,52 +1,67 @@
-"""The feasible flights that the search starts from: straight, and by way of the stations."""
+"""The feasible flights that the search starts from: straight, and by way of the stations.
 
-from bisect import bisect_left
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from itertools import pairwise
+A start is a way, corner by corner, that is flown with a stop at each corner, or else by the flight
+nearest to it. Inside a fence ways are the shortest ones. An aircraft that cannot hover circles at
+the stations, and one that has to save energy on its way.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle, islice, pairwise
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
+from faao_mav.mission.fence_area import FreeArea
+from faao_mav.optimizer.interior.constraint import Constraint, every_excess
+from faao_mav.optimizer.interior.energy import EnergyLimit
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.search.cruise import cruise, cruise_by
-from faao_mav.optimizer.search.track import nearest_flight
+from faao_mav.optimizer.search.cruise import cruise_by
+from faao_mav.optimizer.search.straight import straight_flight, with_stops
+from faao_mav.optimizer.search.track import ALLOWED, nearest_flight
 
 BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
 """What `global` stands for: paths found over the map gained nothing beside these (44 random plans,
 fences and samples)."""
 
-_BISECTIONS = 8
-"""Bisections of the share of the way to the stations: it is found to 1 / 256. Chosen."""
+_SHARES = (1.0, 0.75, 0.5, 0.25, 0.1)
+"""Shares of the way to a station that are tried. Chosen."""
 
-_LEAST_SHARE = 0.02
-"""Share of the way to a station below which a start would be all but the straight one. Chosen."""
+_ROOM = (2.0, 0.5, 0.0)
+"""Room that ways leave beside the margin where they can, m: a start inside the limits. Chosen."""
 
-_EAST = np.array([1.0, 0.0])  # the direction of a line of no length
-_ALONG = 1e-12  # velocity across a line, in shares of v_max, that counts as none: rounding errors
+_MOST_OTHERS = 4
+"""Most obstacles that are passed on their other side, one at a time. Chosen."""
 
+_PLACES = np.linspace(0, 1, 201)
+"""Shares of a way at which it may be left for a station. Chosen."""
 
-def by_name(names: Sequence[str]) -> Sequence[str]:
-    """Return the flights that `names` of the plan's `optimizer.starts` ask for."""
-    return BY_STATIONS if "global" in names else names
+_TURN_SHARE = 0.7
+"""Share of the largest acceleration that circles of a start take; the rest is for the way. Chosen.
+"""
 
 
 def starts(
-    kin: Kinematics, names: Sequence[str], stations: Mapping[str, Real]
+    kin: Kinematics,
+    names: Sequence[str],
+    stations: Mapping[str, Real],
+    area: FreeArea | None = None,
+    fence: Sequence[Constraint] = (),
 ) -> dict[str, Trajectory]:
-    """Return the flights named in the plan's `optimizer.starts`.
+    """Return the flights named in the plan's `optimizer.starts`, inside `area` by the `fence`.
 
     A name is `straight` or the stations in the order of the visit, as in `bs-user`. A flight by way
-    of stations goes as far towards them as the time allows, and hovers there for what time is left;
-    with a least speed it goes all the way and circles there. Flights that do not exist (no time at
-    all, or end velocities across the way) are left out. If none is left, the result is the straight
-    flight.
+    of stations goes as far towards them as time and fence allow, and hovers there for what time is
+    left; with a least speed it circles there. Inside a fence there are also those that pass an
+    obstacle of the straight way on its other side, `straight 2` and on. Flights that were not found
+    are left out. If none is left, the result is the straight flight.
 
     Args:
         kin: the feasible set.
         names: the flights asked for.
         stations: the positions (2,) of the stations by name, m.
+        area: where the path may be; None for everywhere.
+        fence: what flights have to keep to be there.
 
     Raises:
         InfeasibleError: there is no straight flight, and it was asked for or is the only one.
@@ -57,193 +72,139 @@ def starts(
     >>> [round(float(flight.w[:, 1].max()), 3) for flight in flights.values()]
     [0.0, 20.0]
     """
-    found = {}
-    for name in names:
+    found: dict[str, Trajectory] = {}
+    direct = shortest_by(area, [kin.start, kin.end])
+    for name in BY_STATIONS if "global" in names else names:
+        if direct is None:
+            break
         if name == "straight":
-            found[name] = straight_flight(kin)
+            ways, most = iter([direct, *_on_other_sides(area, direct)]), None
+        else:
+            stops = [stations[key] for key in name.split("-")]
+            ways, most = _by_way_of(area, kin, direct, stops), 1
+        flights = (along(kin, way, fence) for way in ways)
+        for number, flight in enumerate(islice(filter(None, flights), most), 1):
+            found[name if number == 1 else f"{name} {number}"] = flight
+    if not found and direct is not None:
+        straight = along(kin, direct, fence)
+        found = {} if straight is None else {"straight": straight}
+    if not found:
+        raise InfeasibleError(
+            "no flight was found that stays inside the fence with its margin, keeps "
+            f"{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2, and ends in time; give "
+            "more flight.duration, a smaller fence.margin or another start or end"
+        )
+    return found
+
+
+def shortest_by(area: FreeArea | None, points: Sequence[Real]) -> Real | None:
+    """Return the corners (k, 2) of the shortest way through `points`; None if there is none."""
+    if area is None:
+        return np.array(points)
+    corners = [points[0][None]]
+    for a, b in pairwise(points):
+        ways = (
+            area.inside(room).shortest_way(a, b) if room else area.shortest_way(a, b)
+            for room in _ROOM
+        )
+        way = next((way for way in ways if way is not None), None)
+        if way is None:
+            return None
+        corners.append(way[1:])
+    return np.concatenate(corners)
+
+
+def points_along(way: Real, shares: Real | float) -> Real:
+    """Return the points (..., 2) at `shares` (...) of the length of `way` (k, 2)."""
+    gone = np.append(0, np.cumsum(np.hypot(*np.diff(way, axis=0).T)))
+    return np.stack([np.interp(shares * gone[-1], gone, x) for x in way.T], axis=-1)
+
+
+def _on_other_sides(area: FreeArea | None, way: Real) -> list[Real]:
+    """Return the ways that pass one of the obstacles that `way` turns round on its other side."""
+    others: list[Real] = []
+    if area is None:
+        return others
+    import shapely
+
+    holes = area.holes
+    left = set(range(len(holes)))
+    for before, corner, after in zip(way[:-2], way[1:-1], way[2:], strict=True):
+        away = shapely.distance(holes, shapely.Point(corner)) if left else np.full(1, np.inf)
+        hole = int(np.argmin(away))
+        if hole not in left or away[hole] > 2 * max(_ROOM):
             continue
-        stops = [stations[key] for key in name.split("-")]
-        flight = _circling_by(kin, stops) if kin.min_speed > 0 else _by_way_of(kin, stops)
-        if flight is not None:
-            found[name] = flight
-    return found or {"straight": straight_flight(kin)}
+        left.remove(hole)
+        inward = sum((each - corner) / np.hypot(*(each - corner)) for each in (before, after))
+        blocked = area.barred(corner, -inward / np.hypot(*inward))
+        other = None if blocked is None else shortest_by(blocked, [way[0], way[-1]])
+        if other is not None:
+            others.append(other)
+    return others[:_MOST_OTHERS]
 
 
-def straight_flight(kin: Kinematics) -> Trajectory:
-    """Return a feasible flight along the line from w_I to w_F, at the most even speed.
+def _by_way_of(
+    area: FreeArea | None, kin: Kinematics, direct: Real, stations: Sequence[Real]
+) -> Iterator[Real]:
+    """Yield ways towards the `stations`, the farthest first."""
+    spurs, places = [], points_along(direct, _PLACES)
+    for station in stations:
+        stop = station if area is None else area.nearest(station, kin.start)
+        anchor = places[np.hypot(*(places - stop).T).argmin()]
+        spur = shortest_by(area, [anchor, stop])
+        if spur is None:
+            return
+        spurs.append(spur)
+    farthest = kin.max_speed * kin.time_step * (kin.slots - 1)
+    for share in _SHARES if kin.min_speed == 0 or area is not None else (1.0,):
+        stops = [points_along(spur, share) for spur in spurs]
+        way = shortest_by(area, [kin.start, *stops, kin.end])
+        if way is not None and np.hypot(*np.diff(way, axis=0).T).sum() <= farthest:
+            yield way
 
-    Where end velocities do not lie on that line, it is the nearest flight to it; where the line is
-    too short for the least speed, one with detours (see `cruise`).
 
-    Raises:
-        InfeasibleError: there is no feasible flight, or none was found that keeps the least speed.
+def along(kin: Kinematics, way: Real, fence: Sequence[Constraint]) -> Trajectory | None:
+    """Return a flight that stops, or circles, at the corners of `way`, else one that tracks it.
+
+    None where none is found that keeps the `fence`, or without one where there is no time to stop.
     """
-    if kin.min_speed > 0 and any(kin.wind):
-        return kin.over_ground(straight_flight(kin.in_the_air()))
-    line = kin.end - kin.start
-    distance = float(np.linalg.norm(line))
-    ends = [v for v in (kin.start_velocity, kin.end_velocity) if v is not None]
-    fallback = next((v / np.linalg.norm(v) for v in ends if v.any()), _EAST)
-    direction = line / distance if distance else fallback
-    if not _leads_aside(kin, direction):
-        speed = even_speed(kin, direction, distance)
-        if speed is not None:
-            flight = kin.follow(speed[:, None] * direction)
-            if kin.residuals(flight).get("turn", 0.0) < 1e-9:
-                return flight
-    return cruise(kin) if kin.min_speed > 0 else _flight_aside(kin)
+    corners = list(way[1:-1])
+    if not fence:
+        return _circling_by(kin, corners) if kin.min_speed and corners else with_stops(kin, corners)
+    if kin.min_speed == 0:
+        flight = with_stops(kin, corners)
+        if flight is not None and every_excess(kin, fence, flight) <= ALLOWED:
+            return flight
+    path = points_along(way, np.linspace(0, 1, kin.slots))
+    return nearest_flight(kin, path, straight_flight(kin), fence)
 
 
-def _circling_by(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
+def _circling_by(kin: Kinematics, stations: Sequence[Real]) -> Trajectory | None:
     """Return the flight that circles at `stations`, with the wind: it is over them at half time."""
     drift = kin.time_step * (kin.slots - 1) / 2 * np.array(kin.wind)
     flight = cruise_by(kin.in_the_air(), [station - drift for station in stations])
     return None if flight is None else kin.over_ground(flight)
 
 
-def _leads_aside(kin: Kinematics, direction: Real) -> bool:
-    """Return whether a given end velocity has a part across `direction` (2,)."""
-    across = np.array([-direction[1], direction[0]])
-    ends = (v for v in (kin.start_velocity, kin.end_velocity) if v is not None)
-    return any(abs(v @ across) > _ALONG * kin.max_speed for v in ends)
+def sparing_starts(
+    kin: Kinematics, routes: Mapping[str, Trajectory], kept: Sequence[Constraint]
+) -> dict[str, Trajectory]:
+    """Return flights near to `routes` that keep the energy limit among `kept`; some may be none.
 
-
-def even_speed(kin: Kinematics, direction: Real, distance: float) -> Real | None:
-    """Return speeds (N + 2,), m/s, along `direction` (2,), as near to one value as possible.
-
-    They cover `distance` metres within the limits of `kin`; None if no speeds do.
+    Rotors take the least power some way above hover. A hover is no start from which that is found:
+    P is stationary at v = 0. So a route that takes too much is led round in circles of the speed of
+    least power, one to the left and the next to the right: which is better depends on what is
+    before and after.
     """
-    lower, upper = _speed_limits(kin, direction)
-    slack = 1e-9 * max(1.0, distance)
-    if (lower > upper + 1e-12).any():
-        return None
-    if not _distance(kin, lower) - slack <= distance <= _distance(kin, upper) + slack:
-        return None
-    # the distance is a piecewise linear function of the speed, with breaks at the limits
-    share = np.full(kin.slots, kin.time_step)
-    share[[0, -1]] /= 2
-    limits = np.concatenate([lower, upper])
-    order = np.argsort(limits)
-    speeds = limits[order]
-    rise = np.cumsum(np.concatenate([share, -share])[order])
-    flown = share @ lower + np.concatenate([[0.0], np.cumsum(rise[:-1] * np.diff(speeds))])
-    return np.asarray(np.clip(np.interp(distance, flown, speeds), lower, upper))
-
-
-def _speed_limits(kin: Kinematics, direction: Real) -> tuple[Real, Real]:
-    """Return the least and the greatest speed (N + 2,) that the ends and the limits allow, m/s."""
-    n = np.arange(kin.slots, dtype=float)
-    rise, fall = (kin.time_step * rate for rate in kin.even_rates)
-    least, most = kin.speeds_along(direction)
-    lower, upper = np.full(kin.slots, least), np.full(kin.slots, most)
-    if kin.start_velocity is not None:
-        first = float(kin.start_velocity @ direction)
-        steps = n + (0.0 if kin.bound_first_acceleration else np.where(n > 0, np.inf, 0.0))
-        upper = np.minimum(upper, first + rise * steps)
-        lower = np.maximum(lower, first - fall * steps)
-    if kin.end_velocity is not None:
-        last, steps = float(kin.end_velocity @ direction), n[::-1]
-        upper = np.minimum(upper, last + fall * steps)
-        lower = np.maximum(lower, last - rise * steps)
-    return lower, upper
-
-
-def _distance(kin: Kinematics, speed: Real) -> float:
-    """Return the distance in metres at the speeds (N + 2,)."""
-    return float(kin.time_step * (speed[:-1] + speed[1:]).sum() / 2)
-
-
-def _flight_aside(kin: Kinematics) -> Trajectory:
-    """Return the feasible flight nearest to an even one, for end velocities across the line."""
-    share = np.linspace(0, 1, kin.slots)[:, None]
-    even = kin.start + share * (kin.end - kin.start)
-    ends = (
-        np.zeros(2) if velocity is None else velocity
-        for velocity in (kin.start_velocity, kin.end_velocity)
-    )
-    first, last = ends
-    flight = nearest_flight(kin, even, kin.follow((1 - share) * first + share * last))
-    if flight is None:
-        air = f"{kin.max_airspeed:.4g} m/s through the air, " if any(kin.wind) else ""
-        raise InfeasibleError(
-            "no flight from start to end meets the end velocities within the duration, "
-            f"{air}{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2; "
-            "give more time or gentler end velocities"
-        )
-    return flight
-
-
-def _by_way_of(kin: Kinematics, stations: list[Real]) -> Trajectory | None:
-    """Return the flight that goes the largest possible share of the way to `stations`."""
-    anchors = [_nearest_on_line(kin.start, kin.end, p) for p in stations]
-
-    def attempt(share: float) -> Trajectory | None:
-        return with_stops(
-            kin, [a + share * (p - a) for a, p in zip(anchors, stations, strict=True)]
-        )
-
-    best = attempt(1.0)
-    if best is not None or attempt(_LEAST_SHARE) is None:
-        return best
-    low, high = 0.0, 1.0
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        flight = attempt(middle)
-        low, high, best = (low, middle, best) if flight is None else (middle, high, flight)
-    return best
-
-
-def _nearest_on_line(a: Real, b: Real, p: Real) -> Real:
-    """Return the point nearest to p between a and b, (2,)."""
-    line = b - a
-    square = float(line @ line)
-    share = min(1.0, max(0.0, float((p - a) @ line) / square)) if square else 0.0
-    return np.asarray(a + share * line)
-
-
-def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
-    """Return the flight that stops at `stops`, straight between them; None if the time is short.
-
-    Between stops it is as quick as it can be, and hovers at each for an even part of the rest.
-    """
-    if not stops:
-        return straight_flight(kin)
-    legs, spare = list[Real](), kin.slots - 1
-    for k, (a, b) in enumerate(pairwise([kin.start, *stops, kin.end])):
-        first, last = k == 0, k == len(stops)
-        leg = _quickest(
-            replace(
-                kin,
-                start=a,
-                end=b,
-                slots=spare + 1,
-                start_velocity=kin.start_velocity if first else np.zeros(2),
-                end_velocity=kin.end_velocity if last else np.zeros(2),
-                bound_first_acceleration=kin.bound_first_acceleration or not first,
-            )
-        )
-        if leg is None:
-            return None
-        spare -= len(leg) - 1
-        legs.append(leg)
-    for k in range(len(stops)):
-        hover = spare // len(stops) + (k < spare % len(stops))
-        legs[k + 1] = np.vstack([np.zeros((hover, 2)), legs[k + 1][1:]])
-    return kin.follow(np.vstack(legs))
-
-
-def _quickest(kin: Kinematics) -> Real | None:
-    """Return the velocities (n, 2) of a straight flight in the fewest slots, or None."""
-    line = kin.end - kin.start
-    distance = float(np.hypot(*line))
-    direction = line / distance if distance else _EAST
-    if _leads_aside(kin, direction):
-        return None
-
-    def speed_in(slots: int) -> Real | None:
-        return even_speed(replace(kin, slots=slots), direction, distance)
-
-    counts = range(2, kin.slots + 1)
-    found = bisect_left(counts, True, key=lambda slots: speed_in(slots) is not None)
-    speed = speed_in(counts[found]) if found < len(counts) else None
-    return None if speed is None else speed[:, None] * direction
+    (limit,) = (each for each in kept if isinstance(each, EnergyLimit))
+    speed, _ = limit.model.least_power(kin.max_speed * _PLACES[1:])
+    rate = _TURN_SHARE * kin.turning(speed) / speed
+    found = {}
+    for side, (name, route) in zip(cycle((1, -1)), routes.items(), strict=False):
+        angle = side * rate * kin.time_step * np.arange(kin.slots)
+        circled = route.w + speed / rate * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        spares = every_excess(kin, kept, route) <= ALLOWED
+        flight = route if spares else nearest_flight(kin, circled, route, kept)
+        if flight is not None:
+            found[name] = flight
+    return found
