@@ -13,7 +13,7 @@ from test_interior import plane, worst
 from faao_mav.arrays import Real
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.search.turning import turning_curves
+from faao_mav.optimizer.search.cruise import turning_curves
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Vector
 from faao_mav.report.summary import result_lines
