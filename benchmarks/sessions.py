@@ -46,7 +46,7 @@ from faao_mav.wire import link, upload
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer.session import upload_parts
+from faao_mav.wire.jobs import upload_parts
 from faao_mav.wire.transport import open_transport
 from faao_mav.wire.wire_items import wire_items
 

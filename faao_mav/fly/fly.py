@@ -15,7 +15,7 @@ from faao_mav.validate.rule import Finding
 from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer.verify import Difference
+from faao_mav.wire.verify import Difference
 from faao_mav.wire.wire_items import wire_items
 
 

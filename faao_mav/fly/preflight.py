@@ -23,7 +23,7 @@ from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.parameters import number_in
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer import Peer
 from faao_mav.wire.whereabouts import (
     FIRST_AWAY,
     FIRST_FARTHEST,

@@ -8,14 +8,14 @@ from faao_mav.autopilot import Vehicle, VehicleType
 from faao_mav.autopilot.files import MadeFor
 from faao_mav.errors import InputError
 from faao_mav.mission.item import Home, Mission
+from faao_mav.wire.jobs import download_lists
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import HomePosition, WireItem
 from faao_mav.wire.parameters import Reading, read_parameters
 from faao_mav.wire.protocol import HOME_POSITION, MissionType
 from faao_mav.wire.questions import ask_for
-from faao_mav.wire.transfer.exchange import Outcome, Peer
-from faao_mav.wire.transfer.session import download_lists
-from faao_mav.wire.transfer.verify import Difference, compare
+from faao_mav.wire.transfer import PartReport, Peer
+from faao_mav.wire.verify import Difference, compare
 from faao_mav.wire.whereabouts import home_in
 from faao_mav.wire.wire_items import home_items, mission_of
 
@@ -34,7 +34,7 @@ class Held:
 
     lists: Mapping[MissionType, tuple[WireItem, ...]]
     reading: Reading
-    missing: Mapping[MissionType, Outcome] = field(default_factory=dict)
+    missing: Mapping[MissionType, PartReport] = field(default_factory=dict)
     home: Home | None = None
 
     def rows(self, part: MissionType, vehicle: VehicleType) -> tuple[WireItem, ...]:

@@ -24,7 +24,7 @@ from faao_mav.wire.messages import (
     Timesync,
 )
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
-from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer import Peer
 
 _OFF_GROUND, _SLOW_CLIMB = 0.3, 0.5
 """Metres above home from which on a take-off is under way, though its answer is lost; and the least

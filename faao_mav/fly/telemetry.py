@@ -33,8 +33,8 @@ from faao_mav.wire.protocol import (
     MavSeverity,
     MissionType,
 )
-from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.verify import compare
+from faao_mav.wire.transfer import Peer
+from faao_mav.wire.verify import compare
 from faao_mav.wire.whereabouts import place_in
 from faao_mav.wire.wire_items import home_items
 

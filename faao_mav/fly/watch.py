@@ -19,7 +19,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, command_result
-from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer import Peer
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",

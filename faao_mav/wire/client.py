@@ -13,6 +13,13 @@ from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import FoundVehicle, choose, discover
+from faao_mav.wire.jobs import (
+    Lists,
+    download_lists,
+    explain,
+    upload_parts,
+    what_is_left,
+)
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition, WireItem
@@ -27,17 +34,7 @@ from faao_mav.wire.protocol import (
 )
 from faao_mav.wire.questions import Timeouts, ask_alive, ask_for
 from faao_mav.wire.signing import Verdict, read_signing, remember
-from faao_mav.wire.transfer.exchange import Outcome, Peer
-from faao_mav.wire.transfer.session import (
-    ABSENT,
-    Lists,
-    PartReport,
-    clear_lists,
-    download_lists,
-    explain,
-    upload_parts,
-    what_is_left,
-)
+from faao_mav.wire.transfer import PartReport, Peer
 from faao_mav.wire.transport import parse_connection
 from faao_mav.wire.whereabouts import Whereabouts, home_in, place_in
 from faao_mav.wire.wire_items import home_items, mission_of, wire_items
@@ -170,10 +167,8 @@ def _put(
     changes, problem = yield from set_parameters(parameters, peer)
     if problem:
         return told, changes, problem, ()
-    reports = yield from upload_parts([each for each in lists.items() if each[1]], peer)
-    if clear_rest and all(each.verified for each in reports):
-        cleared = yield from clear_lists([part for part in lists if not lists[part]], peer)
-        reports += tuple(each for each in cleared if each.result not in ABSENT)
+    parts = [each for each in lists.items() if each[1] or clear_rest]
+    reports = yield from upload_parts(parts, peer)
     return told, changes, problem, reports
 
 
@@ -318,11 +313,11 @@ class Session(WireLink):
             )
         raise LinkError(f"{connection}: {self.found}: {why}")
 
-    def not_read(self, part: MissionType, outcome: Outcome) -> str:
+    def not_read(self, part: MissionType, report: PartReport) -> str:
         """Return in words why a list was not read."""
         why = "the vehicle stopped answering"
-        if outcome.result is not None:
-            why = f"refused: {meaning(outcome.result, self.peer.manners.meanings)}"
+        if report.result is not None:
+            why = f"refused: {meaning(report.result, self.peer.manners.meanings)}"
         elif part is MissionType.MISSION:
             why += self.why_silent()
         return f"{part.title}: not read: {why}"

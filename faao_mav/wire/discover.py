@@ -21,7 +21,7 @@ from faao_mav.wire.protocol import (
     MavState,
     listed,
 )
-from faao_mav.wire.questions import BOOT
+from faao_mav.wire.transfer import BOOT
 from faao_mav.wire.transport import Origin
 
 _MAIN = 1

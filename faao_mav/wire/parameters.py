@@ -16,7 +16,7 @@ from faao_mav.wire.machine import AT_ONCE, Talk
 from faao_mav.wire.messages import Envelope, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.protocol import listed
 from faao_mav.wire.questions import Pace, Questions, ask
-from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer import Peer
 
 Names: TypeAlias = tuple[str, ...]
 """The names that one parameter has in the generations of an autopilot: a vehicle has one."""
@@ -27,10 +27,10 @@ _INT32 = 6
 _AT_ONCE = 10
 """Names that are asked for at once. Chosen: half of the queue that ArduPilot has for them."""
 
-_LEAST_WAIT, _TRIES = 0.25, 8
-"""Seconds after which a name is asked for again at the earliest, and how often it is asked for.
-Chosen: of 50 parameters, over a link that loses a fifth each way, one stays unread in 1.4 % of all
-readings; a name that the vehicle does not know costs 4 s."""
+_SILENCE = 4.0
+"""Seconds without a new answer after which no more names are asked for. Chosen: of 50 parameters,
+over a link that loses a fifth each way, one stays unread in 1.4 % of all readings; a name that the
+vehicle does not know costs these seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,29 +71,26 @@ def same_value(one: float, other: float) -> bool:
 
 
 def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
-    """Read `parameters` of the vehicle of `peer`, each by all of its names.
-
-    A name is asked for `_TRIES` times in the pace of the link; who answers none of the first ones
-    has no parameters.
-    """
+    """Read `parameters` of the vehicle of `peer`, each by all of its names."""
     line = yield AT_ONCE
     left = list(dict.fromkeys(parameters))
-    asked, total = Questions[Names](line, Pace(), _LEAST_WAIT), len(left)
+    questions, total = Questions[Names](line, Pace(), _SILENCE), len(left)
     names_of = {name: names for names in left for name in names}
-    values, kinds, missing = dict[str, float](), dict[str, int](), list[Names]()
-    while (left or asked) and (values or not missing):
-        while left and sum(map(len, asked)) < _AT_ONCE:
+    values, kinds = dict[str, float](), dict[str, int]()
+    while (left or questions.asked) and not questions.over:
+        # Those that were put three times, which it may not have, make room for others.
+        room = sum(len(names) for names, each in questions.asked.items() if each.times < 3)
+        while left and room < _AT_ONCE:
             names = left.pop(0)
-            asked.put(names, *(ParamRequestRead(peer.address, name, -1) for name in names))
-        line.progress = "reading parameters", total - len(left) - len(asked), total
-        line = yield asked.due
-        told = _told(peer, line.heard)
-        if told is not None and (names := names_of.get(told.param_id, ())) in asked:
+            room += len(names)
+            questions.put(names, *(ParamRequestRead(peer.address, name, -1) for name in names))
+        line.progress = "reading parameters", total - len(left) - len(questions.asked), total
+        told = _told(peer, (yield from questions.hear()))
+        if told is not None and questions.answer(names_of.get(told.param_id, ())):
             values[told.param_id] = value_in(told, peer.vehicle)
             kinds[told.param_id] = told.param_type
-            asked.answer(names)
-        missing += asked.repeat(_TRIES) if line.heard is None else []
-    return Reading(values, (*missing, *asked, *left), kinds)
+            questions.further()
+    return Reading(values, (*questions.asked, *left), kinds)
 
 
 def _told(peer: Peer, heard: Envelope | None) -> ParamValue | None:

@@ -1,7 +1,6 @@
 """Questions that are put until they are answered, at the pace of the link."""
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -25,9 +24,6 @@ class Timeouts:
     silence: float = 9.0
     attempts: int = 3
 
-
-BOOT = 60.0
-"""Seconds that a vehicle may boot; chosen."""
 
 _FIRST, SLOWEST = 0.25, 1.5
 """Seconds after which a question is put again while it is not known how long answers take, and at
@@ -73,74 +69,72 @@ class Pace:
 
 
 @dataclass(slots=True)
-class _Question:
+class Question:
     """What is said when it is late; when it was put last, s, and how often."""
 
-    again: Sequence[Message] = ()
+    again: tuple[Message, ...] = ()
     sent: float = 0.0
     times: int = 0
 
 
 class Questions(Generic[K]):
-    """Questions under way on a line, each under a key: the late ones are put again at a `pace`.
+    """Questions on a `line`, each under a key, which are put again at a `pace` until answered.
 
-    `least` is how long one waits before it is put again, s, at the least.
+    They are over at the time `until`: `silence` seconds after they last got `further`.
     """
 
-    def __init__(self, line: Line, pace: Pace, least: float = 0.0) -> None:
-        self._line, self.pace, self.least = line, pace, least
-        self._asked: dict[K, _Question] = {}
-        self.last = -math.inf
-        """When one was put last, s."""
+    def __init__(self, line: Line, pace: Pace, silence: float) -> None:
+        self._line, self.pace, self._silence = line, pace, silence
+        self.asked: dict[K, Question] = {}
+        self.until = line.now + silence
 
-    def __len__(self) -> int:
-        return len(self._asked)
+    @property
+    def over(self) -> bool:
+        """Whether nothing was answered for too long."""
+        return self._line.now >= self.until
 
-    def __iter__(self) -> Iterator[K]:
-        return iter(self._asked)
+    def further(self) -> None:
+        """Note that it has got further."""
+        self.until = self._line.now + self._silence
 
-    def put(self, key: K, *messages: Message, again: Sequence[Message] = ()) -> None:
+    def put(self, key: K, *messages: Message, again: tuple[Message, ...] = ()) -> None:
         """Put a question, or one under way once more; `again` is said instead once it is late."""
-        question = self._asked.setdefault(key, _Question())
-        question.again, question.times = again or messages, question.times + 1
-        question.sent = self.last = self._line.now
+        question = self.asked.setdefault(key, Question())
+        question.again, question.sent = again or messages, self._line.now
+        question.times += 1
         self._line.say(*messages)
 
     def times(self, key: K) -> int:
         """Return how often a question under way was put."""
-        return self._asked[key].times if key in self._asked else 0
+        return self.asked[key].times if key in self.asked else 0
 
-    def answer(self, key: K) -> None:
-        """Note that a question is answered, if it is under way."""
-        question = self._asked.pop(key, None)
-        if question is not None and question.times == 1:
+    def answer(self, key: K) -> bool:
+        """Note that a question is answered; tell whether it was under way."""
+        question = self.asked.pop(key, None)
+        if question is None:
+            return False
+        if question.times == 1:
             self.pace.answer(self._line.now - question.sent)
+        return True
 
-    def clear(self) -> None:
-        """Wait for no answer any more."""
-        self._asked.clear()
+    def hear(self) -> Talk[Envelope | None]:
+        """Return what is heard next; None once time has passed, and late ones were put again."""
+        yield min([self.until, *map(self._due, self.asked.values())])
+        if self._line.heard is None:
+            self._repeat()
+        return self._line.heard
 
-    @property
-    def due(self) -> float:
-        """When the next one is to be put again; infinity where there is none."""
-        return min(map(self._due, self._asked.values()), default=math.inf)
-
-    def repeat(self, most: float = math.inf) -> list[K]:
-        """Put late ones again; return those given up, which were put `most` times."""
-        late = [key for key, each in self._asked.items() if self._due(each) <= self._line.now]
-        if any(self._asked[key].times == 1 for key in late):
+    def _repeat(self) -> None:
+        late = [key for key, each in self.asked.items() if self._due(each) <= self._line.now]
+        if any(self.asked[key].times == 1 for key in late):
             self.pace.repeat()
         for key in late:
-            question = self._asked.pop(key)
-            if question.times < most:
-                self._asked[key] = question
-                self.put(key, *question.again)
-        return [key for key in late if key not in self._asked]
+            self.put(key, *self.asked[key].again)
 
-    def _due(self, question: _Question) -> float:
+    def _due(self, question: Question) -> float:
         """Return when `question` is put again: each time after twice as long."""
         wait = self.pace.wait * 2.0 ** min(question.times - 1, 8)  # beyond the longest
-        return question.sent + max(min(wait, max(_LONGEST, self.pace.wait)), self.least)
+        return question.sent + min(wait, max(_LONGEST, self.pace.wait))
 
 
 def ask(
@@ -155,23 +149,22 @@ def ask(
     """
     line = yield AT_ONCE
     line.progress = what, 0, 0
-    asked, until = Questions[int](line, Pace()), line.now + patience
-    asked.put(0, question)
-    while line.now < until:
-        line = yield min(asked.due, until)
-        found = None if line.heard is None else answer(line.heard)
+    questions = Questions[str](line, Pace(), patience)
+    questions.put(what, question)
+    while not questions.over:
+        heard = yield from questions.hear()
+        found = None if heard is None else answer(heard)
         if found is not None:
             return found
-        asked.repeat()
     return None
 
 
 def ask_for(vehicle: Address, number: int, kind: type[M]) -> Talk[M | None]:
     """Ask `vehicle` for its message of the type `kind` and that `number`."""
 
-    def answer(envelope: Envelope) -> M | None:
-        message = envelope.message
-        return message if envelope.sender == vehicle and isinstance(message, kind) else None
+    def answer(heard: Envelope) -> M | None:
+        message = heard.message
+        return message if heard.sender == vehicle and isinstance(message, kind) else None
 
     question = CommandLong(vehicle, MavCommand.REQUEST_MESSAGE, 0, float(number))
     return ask(f"asking for {kind.__name__}", question, answer)
@@ -184,10 +177,10 @@ def ask_alive(vehicle: Address, number: int, patience: float = 9.0) -> Talk[bool
     and what was recorded before the answer is older than it: it is passed over from then on.
     """
 
-    def answer(envelope: Envelope) -> Message | None:
-        match envelope.message:
-            case Timesync(tc1=tc1, ts1=ts1) as said if envelope.sender == vehicle:
-                return said if tc1 and ts1 == number else None
+    def answer(heard: Envelope) -> bool | None:
+        match heard.message:
+            case Timesync(tc1=tc1, ts1=ts1) if heard.sender == vehicle and tc1 and ts1 == number:
+                return True
         return None
 
     said = yield from ask("asking for a sign of life", Timesync(0, number), answer, patience)

@@ -1,8 +1,8 @@
 """An upload in words: the lines of the terminal and of the planner page."""
 
 from faao_mav.wire.client import UploadReport
-from faao_mav.wire.transfer.session import PartReport
-from faao_mav.wire.transfer.verify import Difference
+from faao_mav.wire.transfer import PartReport
+from faao_mav.wire.verify import Difference
 
 
 def upload_text(report: UploadReport) -> str:

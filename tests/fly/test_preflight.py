@@ -36,7 +36,7 @@ from faao_mav.sim import MockAutopilot
 from faao_mav.validate import Finding, Level
 from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
 from faao_mav.wire.protocol import GROUND_STATION, MissionType
-from faao_mav.wire.transfer.exchange import Outcome
+from faao_mav.wire.transfer import PartReport
 from faao_mav.wire.wire_items import wire_items
 
 GATE = Path(__file__).parents[1] / "data" / "fly" / "gate.txt"
@@ -85,7 +85,7 @@ def found(flight: Flight, mock: MockAutopilot, told: Mapping[str, str]) -> dict[
     if "unread" in told:
         part = MissionType[told["unread"].upper()]
         lists = {each: rows for each, rows in held.lists.items() if each is not part}
-        held = replace(held, lists=lists, missing={part: Outcome("silent")})
+        held = replace(held, lists=lists, missing={part: PartReport(part, "silent")})
     seen = Telemetry(peer_of(mock.behaviour.family.key), ())
     stands = told.get("stands", "0")
     seen.place = PLACES[stands] if stands in PLACES else away(*map(float, stands.split(",")))

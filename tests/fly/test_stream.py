@@ -31,7 +31,7 @@ from faao_mav.wire.messages import (
     Timesync,
 )
 from faao_mav.wire.parameters import Reading
-from faao_mav.wire.transfer.exchange import Peer
+from faao_mav.wire.transfer import Peer
 
 KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 FENCE = {

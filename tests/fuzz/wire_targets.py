@@ -19,6 +19,12 @@ from faao_mav.wire.client import UploadReport
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.framing import Framer
+from faao_mav.wire.jobs import (
+    Lists,
+    download_lists,
+    explain,
+    upload_parts,
+)
 from faao_mav.wire.machine import Machine, Script, Talk
 from faao_mav.wire.messages import (
     CommandLong,
@@ -41,14 +47,7 @@ from faao_mav.wire.protocol import (
 )
 from faao_mav.wire.questions import ask_alive, ask_for
 from faao_mav.wire.signing import Signing
-from faao_mav.wire.transfer.exchange import Peer
-from faao_mav.wire.transfer.session import (
-    Lists,
-    clear_lists,
-    download_lists,
-    explain,
-    upload_parts,
-)
+from faao_mav.wire.transfer import Peer
 from faao_mav.wire.upload_text import upload_text
 from faao_mav.wire.wire_items import mission_of, wire_items
 
@@ -113,7 +112,7 @@ def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
     yield Script(upload_parts(lists, peer))
     yield Script(download_lists(tuple(MissionType), peer))
     yield Script(_asks(peer))
-    yield Script(clear_lists((MissionType.FENCE, MissionType.RALLY), peer))
+    yield Script(upload_parts([(MissionType.FENCE, ()), (MissionType.RALLY, ())], peer))
 
 
 def _asks(peer: Peer) -> Talk[list[object]]:

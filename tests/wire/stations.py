@@ -13,6 +13,7 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
+from faao_mav.wire.jobs import upload_parts
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
@@ -22,8 +23,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
-from faao_mav.wire.transfer.exchange import Peer, read_list, send_list
-from faao_mav.wire.transfer.session import upload_parts
+from faao_mav.wire.transfer import Peer, read_list, send_list
 from faao_mav.wire.wire_items import wire_items
 
 VEHICLE = Address(1, 1)
@@ -210,7 +210,7 @@ def there_and_back(
         client, server = Counted(Script(talk)), Counted(mock)
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
         took = simulate(*stations, faults, until=2000.0, **more)
-        courses.append(Course(client.outcome.status, took, client.number(), server.number()))
-        if client.outcome.items:
-            assert client.outcome.items == mock.lists.items(MissionType.MISSION)
+        courses.append(Course(client.outcome.verdict, took, client.number(), server.number()))
+        if client.outcome.found:
+            assert client.outcome.found == mock.lists.items(MissionType.MISSION)
     return courses

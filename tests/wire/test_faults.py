@@ -28,6 +28,7 @@ from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults
 from faao_mav.sim.lists import StoredLists
 from faao_mav.wire.discover import choose, discover
+from faao_mav.wire.jobs import explain, upload_parts
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
@@ -36,8 +37,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
-from faao_mav.wire.transfer.exchange import TENTATIVE, Peer, send_list
-from faao_mav.wire.transfer.session import clear_lists, explain, upload_parts
+from faao_mav.wire.transfer import TENTATIVE, Peer, send_list
 from faao_mav.wire.wire_items import wire_items
 
 MISSION, FENCES = MissionType.MISSION, MissionType.FENCE
@@ -245,14 +245,14 @@ def test_clearing_over_a_bad_link() -> None:
         for seed in range(10):
             mock = mock_of(kind)
             mock.lists.replace(MissionType.RALLY, rows_for("px4", 3))
-            steps = clear_lists([MissionType.RALLY], peer_of(kind))
+            steps = upload_parts([(MissionType.RALLY, ())], peer_of(kind))
             script: Any = Script(steps)
             client = Station(script, GROUND_STATION)
             simulate(client, Station(mock, VEHICLE), Faults(loss=0.4, seed=seed))
             (report,) = script.outcome
             assert report.verified
             assert mock.lists.items(MissionType.RALLY) == ()
-    dead: Any = Script(clear_lists([FENCES, MissionType.RALLY], peer_of("px4")))
+    dead: Any = Script(upload_parts([(FENCES, ()), (MissionType.RALLY, ())], peer_of("px4")))
     simulate(Station(dead, GROUND_STATION), Station(mock_of("px4"), VEHICLE), Faults(loss=1.0))
     assert [report.verdict for report in dead.outcome] == ["silent"]
 

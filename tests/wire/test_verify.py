@@ -12,7 +12,7 @@ from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer.verify import compare
+from faao_mav.wire.verify import compare
 from faao_mav.wire.wire_items import wire_items
 
 MISSION = MissionType.MISSION

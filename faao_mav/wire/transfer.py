@@ -1,4 +1,4 @@
-"""The transfers of one list, as talks: uploading, downloading and clearing it."""
+"""The transfers of one list, as talks: uploading, clearing and downloading it."""
 
 import math
 from collections.abc import Sequence
@@ -9,9 +9,9 @@ from faao_mav.autopilot import VehicleType
 from faao_mav.autopilot.manners import Manners
 from faao_mav.wire.machine import AT_ONCE, Line, Talk
 from faao_mav.wire.messages import (
+    Envelope,
     Heartbeat,
     ListMessage,
-    Message,
     MissionAck,
     MissionClearAll,
     MissionCount,
@@ -22,9 +22,13 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import Address, MavResult, MavState, MissionType
-from faao_mav.wire.questions import BOOT, SLOWEST, Pace, Questions, Timeouts
+from faao_mav.wire.questions import SLOWEST, Pace, Questions, Timeouts
+from faao_mav.wire.verify import Difference
 
-Status: TypeAlias = Literal["accepted", "unknown", "refused", "silent", "armed", "cancelled"]
+Verdict: TypeAlias = Literal[
+    "accepted", "unknown", "verified", "different", "unread", "refused", "silent", "armed",
+    "cancelled",
+]  # fmt: skip
 
 TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
 """Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
@@ -38,6 +42,9 @@ _OPENING = -1
 
 _TEXTS = 5
 """The number of status texts that are kept, the last ones; chosen."""
+
+BOOT = 60.0
+"""Seconds that a vehicle may boot; chosen."""
 
 _REASONS = 1.5
 """Seconds to wait after a refusal for the status text that gives the reason, and for a heartbeat,
@@ -57,8 +64,9 @@ class Peer:
     """Both ends of a transfer, and what flies at the other: None if its autopilot is not known.
 
     Unless it `may_be_armed`, nothing more is written once a heartbeat of it says that it is armed.
-    `pace` is what its transfers have learnt so far of how long answers take, `beat` its last
-    heartbeat.
+    `pace` is what its transfers have learnt so far of how long answers take, `late` for how many
+    seconds after its answer a request of a download may still be on its way, `beat` the vehicle's
+    last heartbeat.
     """
 
     own: Address
@@ -67,6 +75,7 @@ class Peer:
     may_be_armed: bool = False
     timeouts: Timeouts = field(default_factory=Timeouts)
     pace: Pace = field(default_factory=Pace)
+    late: float = 0.0
     beat: Heartbeat | None = None
 
     @property
@@ -81,36 +90,54 @@ class Peer:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """How a transfer ended.
+class PartReport:
+    """What became of one list.
 
-    `status`: "accepted"; "unknown": everything was sent, but the last answer is missing or
-    ambiguous; "refused" with the `result`; "silent": it got no further; "armed": stopped because
-    the vehicle is armed; "cancelled" by the vehicle with the `result`. `last_requested` is the
-    number of the item last asked for, `items` what was downloaded, `said` the vehicle's status
-    texts, `opaque_id` its number for the list, 0 for none.
+    `verdict`: "refused" with the `result`; "silent": it got no further; "armed": stopped because
+    the vehicle is armed; "cancelled" by the vehicle. Of a transfer, "accepted"; "unknown":
+    everything was sent, but the last answer is missing or ambiguous. Of an upload that is read
+    back, "verified": it is what was sent but for what `differences` tell as dropped; "different":
+    it is not; "unread": accepted, but could not be read back.
+
+    `item` is the number of the item last asked for, `found` what was downloaded, `said` the
+    vehicle's own words, `opaque_id` its number for the list, 0 for none. `items` are those sent,
+    without the home item; `attempts` counts uploads.
     """
 
-    status: Status
+    part: MissionType
+    verdict: Verdict
     result: int | None = None
-    last_requested: int | None = None
-    items: tuple[WireItem, ...] = ()
+    item: int | None = None
+    found: tuple[WireItem, ...] = ()
     said: tuple[str, ...] = ()
     opaque_id: int = 0
+    items: int = 0
+    attempts: int = 1
+    differences: tuple[Difference, ...] = ()
+
+    @property
+    def verified(self) -> bool:
+        """Whether the list is on the vehicle, whole and equal."""
+        return self.verdict == "verified"
 
 
-class _Exchange:
+class _Exchange(Questions[int]):
     """One list on its way: its questions, and what the vehicle says."""
 
     def __init__(self, line: Line, peer: Peer, part: MissionType, *, writes: bool) -> None:
-        self._line, self._peer, self._part = line, peer, part
+        super().__init__(line, peer.pace, peer.timeouts.silence)
+        self._peer, self._part = peer, part
         self._writes = writes and not peer.may_be_armed
         self._texts: list[str] = []
-        self.asked = Questions[int](line, peer.pace)
-        self.until = 0.0
-        """When it is given up, s."""
-        self.result: int | None = None
+        self.item: int | None = None
+        """The number of the item last asked for."""
+        self.doubted: int | None = None
         """What the vehicle said last, if it was no that may be about something else."""
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing more is waited for, or to be written as the vehicle is armed."""
+        return super().over or self.armed
 
     @property
     def armed(self) -> bool:
@@ -119,86 +146,92 @@ class _Exchange:
 
     def further(self) -> None:
         """Note that it has got further."""
-        self.until, self.result = self._line.now + self._peer.timeouts.silence, None
+        super().further()
+        self.doubted = None
 
     def doubt(self, result: int) -> None:
-        """Note a refusal that counts only when nothing else is said."""
-        self.result = result
-        if _OPENING not in self.asked:  # which a busy vehicle is asked until it is free
+        """Note a refusal that counts if nothing else is said soon; a busy vehicle is asked on."""
+        self.doubted = result
+        if _OPENING not in self.asked:
+            self.asked.clear()
             self.until = min(self.until, self._line.now + SLOWEST)
 
-    def hear(self) -> Talk[ListMessage | None]:
-        """Return what the vehicle says of the list, asking again meanwhile; None: it is over."""
-        while self._line.now < self.until and not self.armed:
-            if self._line.heard is None:
-                self.asked.repeat()
-            message = yield from self.wait(min(self.asked.due, self.until))
-            match message:
+    def said(self) -> Talk[ListMessage | None]:
+        """Return what the vehicle says of the list; None: it is over."""
+        while not self.over:
+            heard = yield from self.hear()
+            if heard is None or heard.sender != self._peer.address:
+                continue
+            match heard.message:
                 case ListMessage(target=to, mission_type=part) if part == self._part:
                     if self._peer.own.takes(to):
-                        return message
+                        return heard.message
         return None
+
+    def listen(self, seconds: float) -> Talk[None]:
+        """Pass over what is said for some time."""
+        self.until = self._line.now + seconds
+        while not self.over:
+            yield from self.hear()
 
     def boots(self, result: int, until: float) -> Talk[bool]:
         """Wait for the reason of a refusal; tell whether it was that the vehicle booted.
 
         Then it has done so: before the time `until`.
         """
-        rests, booted = min(self._line.now + _REASONS, until), self._peer.boots
-        while self._line.now < rests and not self.armed:
+        self.asked.clear()
+        self.until, booted = min(self._line.now + _REASONS, until), self._peer.boots
+        while not self.over:
             if booted and result in _NOT_YET:
                 if not self._peer.boots:
                     return True
-                rests = until
-            yield from self.wait(rests)
-            booted = booted or self._peer.boots
-        self.result = result
+                self.until = until
+            yield from self.hear()
+            booted |= self._peer.boots
         return False
 
-    def wait(self, until: float) -> Talk[Message | None]:
-        """Return what the vehicle says next, None where that is nothing by the time `until`."""
+    def hear(self) -> Talk[Envelope | None]:
+        """Return what is heard next, heartbeats and status texts of the vehicle noted."""
         try:
-            yield until
+            heard = yield from super().hear()
         except GeneratorExit:
             self.cancel()
             raise
-        heard = self._line.heard
-        if heard is None or heard.sender != self._peer.address:
-            return None
-        if isinstance(heard.message, Heartbeat):
-            self._peer.beat = heard.message
-        elif isinstance(heard.message, Statustext):
-            self._texts = [*self._texts[1 - _TEXTS :], heard.message.text.strip()]
-        return heard.message
+        if heard is not None and heard.sender == self._peer.address:
+            if isinstance(heard.message, Heartbeat):
+                self._peer.beat = heard.message
+            elif isinstance(heard.message, Statustext):
+                self._texts = [*self._texts[1 - _TEXTS :], heard.message.text.strip()]
+        return heard
 
     def cancel(self) -> None:
         """Tell the vehicle that this transfer is over."""
         self._line.say(MissionAck(self._peer.address, self._part, MavResult.OPERATION_CANCELLED))
 
-    def over(self, reached: int | None = None) -> Outcome:
-        """End it where nothing more was heard, and tell the vehicle."""
+    def stop(self, result: int | None = None) -> PartReport:
+        """End it where nothing more is said, or it was refused with `result`; tell the vehicle."""
         self.cancel()
         if self.armed:
-            return self.ended("armed", None, reached)
-        return self.ended("silent" if self.result is None else "refused", self.result, reached)
+            return self.end("armed")
+        result = result or self.doubted
+        return self.end("silent" if result is None else "refused", result)
 
-    def ended(
+    def end(
         self,
-        status: Status,
+        verdict: Verdict,
         result: int | None = None,
-        reached: int | None = None,
-        items: Sequence[WireItem] = (),
-        opaque_id: int = 0,
-    ) -> Outcome:
-        """Return the outcome."""
+        found: tuple[WireItem, ...] = (),
+        number: int = 0,
+    ) -> PartReport:
+        """Return how it ended."""
         said = tuple(dict.fromkeys(self._texts))
-        return Outcome(status, result, reached, tuple(items), said, opaque_id)
+        return PartReport(self._part, verdict, result, self.item, found, said, number)
 
 
 def send_list(
     items: Sequence[WireItem], peer: Peer, part: MissionType = MissionType.MISSION
-) -> Talk[Outcome]:
-    """Upload `items`, of which there is one at least; the vehicle leads.
+) -> Talk[PartReport]:
+    """Upload `items`, or clear the list where there are none; the vehicle leads.
 
     - Any item below the count is sent whenever it is asked for, by either request, as
       MISSION_ITEM_INT. PX4 and ArduPilot are sent it again when nothing follows: it was lost, or
@@ -209,79 +242,73 @@ def send_list(
     - ArduPilot says INVALID_SEQUENCE of an item that it has, and is sent the next one.
     - An ERROR may be about a duplicate too (PX4: of MISSION_COUNT), and DENIED about a late request
       of a download before: they count when nothing more is asked for.
-    - When everything was sent and no answer comes, the outcome is "unknown", and reading back must
+    - When everything was sent and no answer comes, the verdict is "unknown", and reading back must
       tell.
     - NO_SPACE or UNSUPPORTED from an ArduPilot that boots, as it does after a reboot in the middle,
       means "not yet": it is told again once it is ready.
     """
     line = yield AT_ONCE
-    title, last, boots_until = f"uploading {part.title}", len(items) - 1, math.inf
-    exchange = _Exchange(line, peer, part, writes=True)
-    asked, repeats = exchange.asked, math.isfinite(peer.manners.request_period)
-    pairs = passes_over = peer.manners.ignores_other_items
-
-    def send(seq: int) -> None:
-        ahead = pairs and seq + 1 < last
-        item, *following = (
-            MissionItemInt(peer.address, part, each, items[each])
-            for each in range(seq, seq + 1 + ahead)
-        )
-        asked.put(seq, item, again=[*following, item])
-        if not repeats:
-            asked.clear()
+    exchange, last = _Exchange(line, peer, part, writes=True), len(items) - 1
+    opening = MissionCount(peer.address, part, len(items))
+    what = f"{'uploading' if items else 'clearing'} {part.title}"
+    pairs, boots_until = peer.manners.ignores_other_items, math.inf
 
     def begin() -> tuple[int, int]:
-        asked.clear()
+        exchange.asked.clear()
         exchange.further()
-        if not exchange.armed:
-            asked.put(_OPENING, MissionCount(peer.address, part, len(items)))
+        if not exchange.over:
+            exchange.put(_OPENING, opening if items else MissionClearAll(peer.address, part))
         return _OPENING, _OPENING
+
+    def send(seq: int) -> None:
+        numbers = (seq + 1, seq) if pairs and seq + 1 < last else (seq,)
+        *ahead, item = (MissionItemInt(peer.address, part, each, items[each]) for each in numbers)
+        exchange.put(seq, item, again=(*ahead, item))
+        if peer.vehicle is None:
+            exchange.asked.clear()
 
     current, furthest = begin()
     while True:
-        line.progress = title, furthest + 1, len(items)
-        reached = None if current == _OPENING else current
-        match (yield from exchange.hear()):
+        line.progress = what, furthest + 1, len(items)
+        exchange.item = None if current == _OPENING else current
+        match (yield from exchange.said()):
             case None if furthest == last and not exchange.armed:
-                return exchange.ended("unknown", exchange.result, reached)
+                return exchange.end("unknown", exchange.doubted)
             case None:
-                return exchange.over(reached)
+                return exchange.stop()
             case MissionRequestInt(seq=seq) if seq <= last:
                 if seq > current:
-                    asked.answer(current)
+                    exchange.answer(current)
                 elif seq < current:
-                    asked.clear()
+                    exchange.asked.clear()
                 if seq > furthest:
                     exchange.further()
-                current, furthest, exchange.result = seq, max(furthest, seq), None
+                current, furthest, exchange.doubted = seq, max(furthest, seq), None
                 send(seq)
             case MissionAck(type=MavResult.ACCEPTED, opaque_id=number):
                 # Before the last item was asked for it can only be about something else.
                 if furthest == last:
-                    return exchange.ended("accepted", MavResult.ACCEPTED, reached, (), number)
-            case MissionAck(type=MavResult.INVALID_SEQUENCE) if not passes_over:
-                if asked.times(current) > 1 and current + 1 < last:
-                    asked.answer(current)
+                    return exchange.end("accepted", MavResult.ACCEPTED, (), number)
+            case MissionAck(type=MavResult.INVALID_SEQUENCE):
+                if exchange.times(current) > 1 and current + 1 < last:
+                    exchange.answer(current)
                     current += 1
                     send(current)
-            case MissionAck() if pairs and current != _OPENING and asked.times(current) > 1:
-                pairs = False
+            case MissionAck() if pairs and exchange.times(current) > 1 and current != _OPENING:
                 exchange.cancel()
-                current, furthest = begin()
+                pairs, (current, furthest) = False, begin()
             case MissionAck(type=result) if result in TENTATIVE:
                 exchange.doubt(result)
-                if current != _OPENING:
-                    asked.clear()
             case MissionAck(type=MavResult.OPERATION_CANCELLED as result):
-                return exchange.ended("cancelled", result, reached)
+                return exchange.end("cancelled", result)
             case MissionAck(type=result):
                 boots_until = min(boots_until, line.now + BOOT)
                 if not (yield from exchange.boots(result, boots_until)):
-                    return exchange.over(reached)
+                    return exchange.stop(result)
                 current, furthest = begin()
 
 
-def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcome]:
+def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartReport]:
     """Download a list and acknowledge it.
 
     PX4 gives the item that it expects to be asked for, or the one before, and ends the transfer
@@ -291,77 +318,41 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outco
     it is known how long answers take.
 
     When it gets no further it begins anew, `Timeouts.attempts` times. As a request that came late
-    may have ended it, no request is then sent before the one before must have come.
+    may have ended it, each item is then waited for some time longer.
     """
     line = yield AT_ONCE
     exchange, wide = _Exchange(line, peer, part, writes=False), peer.manners.any_request_order
-    asked, legacy = exchange.asked, False
-
-    def request(seq: int) -> None:
-        asked.put(seq, MissionRequestInt(peer.address, part, seq, legacy))
-
-    for attempt in range(peer.timeouts.attempts):
-        if attempt:
-            asked.least = max(2 * asked.least, _LATE)
+    for _ in range(peer.timeouts.attempts):
         items, count, number, following = dict[int, WireItem](), -1, 0, 0
-        asked.clear()
+        exchange.asked.clear()
         exchange.further()
-        asked.put(_OPENING, MissionRequestList(peer.address, part))
+        exchange.put(_OPENING, MissionRequestList(peer.address, part))
         while len(items) != count:
             line.progress = f"reading {part.title}", len(items), max(count, 0)
-            match (yield from exchange.hear()):
+            match (yield from exchange.said()):
                 case None:
                     break
-                case MissionCount() as told if _OPENING in asked:
-                    asked.answer(_OPENING)
+                case MissionCount() as told if exchange.answer(_OPENING):
                     count, number = told.count, told.opaque_id
-                case MissionCount(count=other) if count not in (-1, other):
-                    break  # the list has changed meanwhile
-                case MissionItemInt(seq=seq, item=item) if seq in asked:
-                    asked.answer(seq)
+                case MissionItemInt(seq=seq, item=item) if exchange.answer(seq):
                     items[seq] = item
-                case MissionAck(type=MavResult.UNSUPPORTED) if count >= 0 and not legacy:
-                    legacy = True
-                    for seq in list(asked):
-                        request(seq)
-                    continue
                 case MissionAck(type=result) if result in {*TENTATIVE, MavResult.INVALID_SEQUENCE}:
                     exchange.doubt(result)  # which may be about a late item of an upload
                     continue
                 case MissionAck(type=result) if result != MavResult.ACCEPTED:
-                    return exchange.ended("refused", result)
+                    return exchange.end("refused", result)
                 case _:
                     continue
+            yield from exchange.listen(peer.late)
             exchange.further()
-            while not wide and following < count and line.now < asked.last + asked.least:
-                yield from exchange.wait(asked.last + asked.least)
-            room = _WINDOW if wide and asked.pace.mean is not None else 1
-            while following < count and len(asked) < room:
-                request(following)
+            room = _WINDOW if wide and exchange.pace.mean is not None else 1
+            while following < count and len(exchange.asked) < room:
+                exchange.put(following, MissionRequestInt(peer.address, part, following))
                 following += 1
         else:
             ack = MissionAck(peer.address, part, MavResult.ACCEPTED)
             line.say(*[ack] * peer.manners.final_acks)
-            found = [items[seq] for seq in range(count)]
-            return exchange.ended("accepted", None, None, found, number)
-    return exchange.over()
-
-
-def clear_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[Outcome]:
-    """Clear a list; asking twice does no harm, so it is asked until it is answered.
-
-    PX4 says nothing while busy, ArduPilot ERROR.
-    """
-    line = yield AT_ONCE
-    exchange = _Exchange(line, peer, part, writes=True)
-    line.progress = f"clearing {part.title}", 0, 0
-    exchange.further()
-    if not exchange.armed:
-        exchange.asked.put(_OPENING, MissionClearAll(peer.address, part))
-    while (message := (yield from exchange.hear())) is not None:
-        if isinstance(message, MissionAck):
-            if message.type != MavResult.ERROR:
-                accepted = message.type == MavResult.ACCEPTED
-                return exchange.ended("accepted" if accepted else "refused", message.type)
-            exchange.doubt(message.type)
-    return exchange.over()
+            found = tuple(items[seq] for seq in range(count))
+            return exchange.end("accepted", None, found, number)
+        peer.late = 0.0 if wide else max(2 * peer.late, _LATE)
+    return exchange.stop()

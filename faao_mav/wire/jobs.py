@@ -1,0 +1,151 @@
+"""Whole jobs on a vehicle, as talks: upload, clear and verify, download everything; in words."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from faao_mav.mission.item import Mission
+from faao_mav.wire.machine import Talk
+from faao_mav.wire.messages import WireItem
+from faao_mav.wire.protocol import MavResult, MissionType, listed, meaning
+from faao_mav.wire.transfer import TENTATIVE, PartReport, Peer, Verdict, read_list, send_list
+from faao_mav.wire.verify import compare
+from faao_mav.wire.wire_items import autopilot_name, home_items
+
+_ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
+"""What a vehicle answers that has no such list at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lists:
+    """What was downloaded; `missing` says why a list is not among `items`."""
+
+    items: dict[MissionType, tuple[WireItem, ...]]
+    missing: dict[MissionType, PartReport]
+
+
+def upload_parts(
+    parts: Sequence[tuple[MissionType, tuple[WireItem, ...]]], peer: Peer
+) -> Talk[tuple[PartReport, ...]]:
+    """Upload lists one after the other, or clear those without items, read each back and compare.
+
+    It stops at the first failure. That a list cannot be cleared which the vehicle does not have at
+    all is none. A transfer that the link broke is begun again, and one whose last answer was lost
+    or whose list reads back differently too (ArduPilot now and then loses a fence that it
+    accepted), at most `Timeouts.attempts` times. A refusal is final, except one that may be about
+    something else.
+    """
+    reports: list[PartReport] = []
+    for part, items in parts:
+        report = yield from _upload_part(part, items, peer)
+        if items or report.result not in _ABSENT:
+            reports.append(report)
+            if not report.verified:
+                break
+    return tuple(reports)
+
+
+def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> Talk[PartReport]:
+    attempt = 0
+    while True:
+        attempt += 1
+        sent = yield from send_list(items, peer, part)
+        report = replace(sent, items=len(items[home_items(peer.vehicle, part) :]), attempts=attempt)
+        doubtful = sent.result in TENTATIVE
+        if sent.verdict in ("accepted", "unknown"):
+            read = yield from read_list(peer, part)
+            verdict: Verdict = "unread" if sent.verdict == "accepted" else "silent"
+            if read.verdict == "accepted":
+                differences = compare(items, read.found, part, peer.vehicle)
+                right = all(difference.kind != "wrong" for difference in differences)
+                # A doubtful refusal is about a duplicate if the list is right, else about an item.
+                verdict = "verified" if right else "refused" if doubtful else "different"
+                number = sent.opaque_id or read.opaque_id
+                report = replace(report, differences=differences, opaque_id=number)
+                if right and doubtful:
+                    report = replace(report, result=None)
+            report = replace(report, verdict=verdict, said=sent.said or read.said)
+        # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So may
+        # DENIED, but not if it is said of every announcement of a whole attempt.
+        passes = doubtful and not (report.result == MavResult.DENIED and report.item is None)
+        refused = report.verdict == "refused" and not passes
+        if (
+            refused
+            or report.verdict in ("verified", "armed")
+            or (attempt == peer.timeouts.attempts)
+        ):
+            return report
+
+
+def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:
+    """Download the lists of `types`, each that comes.
+
+    A vehicle that has no fence or rally points at all is one that has none stored. Where not even
+    the first list comes, and it is not refused, the others are not asked for.
+    """
+    lists = Lists({}, {})
+    for part in types:
+        report = yield from read_list(peer, part)
+        absent = part is not MissionType.MISSION and report.result in _ABSENT
+        if report.verdict == "accepted" or absent:
+            lists.items[part] = report.found
+            continue
+        lists.missing[part] = report
+        if report.verdict != "refused" and not lists.items:
+            break
+    return lists
+
+
+def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> str:
+    """Return in words why the `report` of a list of `mission` is not verified."""
+    home, part = home_items(peer.vehicle, report.part), report.part
+    rows = report.items + home
+    match report.verdict:
+        case "different":
+            wrong = [str(each) for each in report.differences if each.kind == "wrong"]
+            return _with_words(f"not what was sent: {listed(wrong)}", report)
+        case "unread":
+            text = "accepted, but it could not be read back; download it to see what is there"
+            return _with_words(f"{part.title}: {text}", report)
+        case "armed":
+            text = "the vehicle is armed: nothing more is written (--allow-armed allows it)"
+        case "silent":
+            text = "the vehicle stopped answering"
+            if report.item is not None:
+                text += f" after it asked for item {report.item} of {rows}"
+        case "cancelled":
+            text = "the transfer was cancelled by the vehicle"
+        case _:
+            text = f"refused: {meaning(report.result or 0, peer.manners.meanings)}"
+            if report.result == MavResult.NO_SPACE and peer.vehicle is not None:
+                sure = peer.vehicle.dialect.items.sure
+                with_home = " with home" if home else ""
+                text += f": {rows} rows{with_home}, and a vehicle like this holds about {sure}"
+            elif report.item is not None:
+                text += f", at {_named(report.item - home, part, mission)}"
+    text = _with_words(f"{part.title}: {text}", report)
+    atomic = peer.vehicle is None or peer.vehicle.dialect.atomic
+    return text if atomic or report.item is None else f"{text}. {what_is_left(peer)}"
+
+
+def _with_words(text: str, report: PartReport) -> str:
+    """Return `text` with what the vehicle said."""
+    return f"{text}. The vehicle says: {'; '.join(report.said)}" if report.said else text
+
+
+def _named(item: int, part: MissionType, mission: Mission | None) -> str:
+    """Return what people call item `item` of a list, counted from behind the home row."""
+    if item < 0:
+        return "the home row"
+    if part is not MissionType.MISSION or mission is None or item >= len(mission.items):
+        return f"item {item}"
+    return f"item {item} (command {mission.items[item].command})"
+
+
+def what_is_left(peer: Peer) -> str:
+    """Return in words what a vehicle may hold when a change of its lists has stopped half-way."""
+    if peer.vehicle is None:
+        return "What the vehicle holds now is not known: upload again, or download it"
+    name = autopilot_name(peer.vehicle)
+    if peer.vehicle.dialect.atomic:
+        return f"{name} holds the old list or the new one, whole: download it to see which"
+    return f"{name} may now hold old and new items mixed: upload again before flying"

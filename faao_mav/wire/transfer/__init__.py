@@ -1,1 +1,0 @@
-"""The mission protocol: state machines without sockets or sleeping."""
