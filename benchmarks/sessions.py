@@ -43,10 +43,10 @@ from faao_mav.mission import Mission
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import link, upload
+from faao_mav.wire.jobs import upload_parts
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.jobs import upload_parts
 from faao_mav.wire.transport import open_transport
 from faao_mav.wire.wire_items import wire_items
 
