@@ -21,8 +21,10 @@ from faao_mav.wire.protocol import (
     MavState,
     listed,
 )
-from faao_mav.wire.transfer import BOOT
 from faao_mav.wire.transport import Origin
+
+_BOOT = 60.0
+"""Seconds that a vehicle may boot; chosen."""
 
 _MAIN = 1
 """MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
@@ -98,7 +100,7 @@ def discover(
 
     It ends `_SETTLE` seconds after the first, in which others are heard, once all are ready; at
     once where a `system` is given, unless the link `listens` to whoever calls; after `patience`
-    seconds without any, and after `BOOT` seconds in any case.
+    seconds without any, and after `_BOOT` seconds in any case.
 
     Until there is one it asks whoever is there for the time (TIMESYNC): a vehicle that answers
     where it was spoken to has to be spoken to. With `knocks` it sends a heartbeat too where nothing
@@ -137,7 +139,7 @@ def discover(
                 if address.component == _MAIN or address.system not in mains
             )
             complete = all(each.address.component == _MAIN for each in vehicles)
-            ready = all(each.ready for each in vehicles) or line.now >= begun + BOOT
+            ready = all(each.ready for each in vehicles) or line.now >= begun + _BOOT
             if line.now >= settled and ready and (complete or waited or component):
                 return Heard(vehicles, tuple(others.values()))
             due = line.now + _LOOK_AGAIN

@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from typing import Generic, TypeAlias, TypeVar
 
@@ -83,10 +83,16 @@ class Line:
         """Send `messages`."""
         self.said += messages
 
+    def sent(self) -> list[Message]:
+        """Return what was said since the last call."""
+        said, self.said = self.said, []
+        return said
+
 
 Talk: TypeAlias = Generator[float, Line, T]
 """A conversation: it yields until when it waits, s, and is sent its line when something is heard or
-that time has come. What it returns is the outcome of a `Script`; closed, it may still say a word.
+that time has come; `AT_ONCE` first. What it returns is the outcome of a `Script`; closed, it may
+still say a word.
 """
 
 AT_ONCE = -math.inf
@@ -117,32 +123,27 @@ class Script(Machine[T]):
 
     def start(self, now: float) -> Sequence[Message]:
         """Begin the talk."""
-        return self._carry_on(lambda: next(self._talk), now)
+        next(self._talk)
+        return self._carry_on(None, now)
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        self._line.heard = envelope
-        return self._carry_on(lambda: self._talk.send(self._line), now)
+        return self._carry_on(envelope, now)
 
     def _time_out(self, now: float) -> Sequence[Message]:
-        return self._carry_on(lambda: self._talk.send(self._line), now)
+        return self._carry_on(None, now)
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Close the talk: there is no outcome."""
         self._due = math.inf
         self._talk.close()
-        return self._sent()
+        return self._line.sent()
 
-    def _carry_on(self, step: Callable[[], float], now: float) -> Sequence[Message]:
-        self._line.now = now
+    def _carry_on(self, heard: Envelope | None, now: float) -> Sequence[Message]:
+        self._line.now, self._due = now, AT_ONCE
         try:
-            self._due = step()
-            self._line.heard = None
             while self._due == AT_ONCE:
+                self._line.heard, heard = heard, None
                 self._due = self._talk.send(self._line)
         except StopIteration as end:
             self.outcome = end.value
-        return self._sent()
-
-    def _sent(self) -> list[Message]:
-        said, self._line.said = self._line.said, []
-        return said
+        return self._line.sent()

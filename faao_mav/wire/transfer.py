@@ -1,6 +1,5 @@
 """The transfers of one list, as talks: uploading, clearing and downloading it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
@@ -21,7 +20,7 @@ from faao_mav.wire.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.wire.protocol import Address, MavResult, MavState, MissionType
+from faao_mav.wire.protocol import Address, MavResult, MissionType
 from faao_mav.wire.questions import SLOWEST, Pace, Questions, Timeouts
 from faao_mav.wire.verify import Difference
 
@@ -34,22 +33,14 @@ TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
 """Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
 nothing else is said."""
 
-_NOT_YET = frozenset({MavResult.NO_SPACE, MavResult.UNSUPPORTED})
-"""What ArduPilot answers while it boots: before it has storage, and before it knows missions."""
-
 _OPENING = -1
 """The question that opens a transfer, where the others are the numbers of items."""
 
 _TEXTS = 5
 """The number of status texts that are kept, the last ones; chosen."""
 
-BOOT = 60.0
-"""Seconds that a vehicle may boot; chosen."""
-
 _REASONS = 1.5
-"""Seconds to wait after a refusal for the status text that gives the reason, and for a heartbeat,
-which tells whether the vehicle has rebooted: vehicles send one a second; a rebooting ArduCopter's
-came 0.96 s after it had refused."""
+"""Seconds to wait after a refusal for the status text that gives the reason; chosen."""
 
 _LATE = 0.4
 """By how many seconds packets are taken to be late, once one has ended a transfer: chosen, above
@@ -82,11 +73,6 @@ class Peer:
     def manners(self) -> Manners:
         """How the other end behaves in transfers."""
         return Manners() if self.vehicle is None else self.vehicle.family.manners
-
-    @property
-    def boots(self) -> bool:
-        """Whether it says that it is not ready."""
-        return self.beat is not None and self.beat.system_status < MavState.STANDBY
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,22 +160,6 @@ class _Exchange(Questions[int]):
         while not self.over:
             yield from self.hear()
 
-    def boots(self, result: int, until: float) -> Talk[bool]:
-        """Wait for the reason of a refusal; tell whether it was that the vehicle booted.
-
-        Then it has done so: before the time `until`.
-        """
-        self.asked.clear()
-        self.until, booted = min(self._line.now + _REASONS, until), self._peer.boots
-        while not self.over:
-            if booted and result in _NOT_YET:
-                if not self._peer.boots:
-                    return True
-                self.until = until
-            yield from self.hear()
-            booted |= self._peer.boots
-        return False
-
     def hear(self) -> Talk[Envelope | None]:
         """Return what is heard next, heartbeats and status texts of the vehicle noted."""
         try:
@@ -244,14 +214,12 @@ def send_list(
       of a download before: they count when nothing more is asked for.
     - When everything was sent and no answer comes, the verdict is "unknown", and reading back must
       tell.
-    - NO_SPACE or UNSUPPORTED from an ArduPilot that boots, as it does after a reboot in the middle,
-      means "not yet": it is told again once it is ready.
     """
     line = yield AT_ONCE
     exchange, last = _Exchange(line, peer, part, writes=True), len(items) - 1
     opening = MissionCount(peer.address, part, len(items))
     what = f"{'uploading' if items else 'clearing'} {part.title}"
-    pairs, boots_until = peer.manners.ignores_other_items, math.inf
+    pairs = peer.manners.ignores_other_items
 
     def begin() -> tuple[int, int]:
         exchange.asked.clear()
@@ -302,10 +270,9 @@ def send_list(
             case MissionAck(type=MavResult.OPERATION_CANCELLED as result):
                 return exchange.end("cancelled", result)
             case MissionAck(type=result):
-                boots_until = min(boots_until, line.now + BOOT)
-                if not (yield from exchange.boots(result, boots_until)):
-                    return exchange.stop(result)
-                current, furthest = begin()
+                exchange.asked.clear()
+                yield from exchange.listen(_REASONS)
+                return exchange.stop(result)
 
 
 def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartReport]:

@@ -130,15 +130,6 @@ def test_refusals_of_every_kind_are_reported(kind: MockKind) -> None:
 
 
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_an_autopilot_that_reboots_half_way_gets_its_mission(kind: MockKind) -> None:
-    for when in (4.53, 4.6, 4.7):
-        mock, rows = mock_of(kind, boot=4.0), rows_for(kind, 40)
-        report, _ = upload_to(mock, rows, Faults(latency=0.005), events=[(when, mock.reboot)])
-        assert report.verified
-        assert vehicle_holds(mock, rows)
-
-
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 def test_another_ground_station_uploads_something_else_at_the_same_time(kind: MockKind) -> None:
     """One of the two is refused, or both come in turn: nobody is told a wrong thing."""
     for head_start in range(4):

@@ -28,9 +28,7 @@ ME = GROUND_STATION
 ROWS = rows_for("px4", 9)
 FAMILIES = ("ardupilot", "px4")
 CANCEL = MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
-READY, BOOTING, ARMED = (
-    Heartbeat(2, 3, flags, 0, state) for flags, state in ((0, 3), (0, 2), (128, 4))
-)
+READY, ARMED = (Heartbeat(2, 3, flags, 0, state) for flags, state in ((0, 3), (128, 4)))
 
 
 def request(seq: int, *, target: Address = ME, part: int = 0, legacy: bool = False) -> Any:
@@ -86,20 +84,6 @@ def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
     for seq in range(3):
         desk.tell(request(seq))
         assert desk.wait(8.0) == []
-
-
-@pytest.mark.parametrize("beats", [(), (READY,), (BOOTING,), (BOOTING, READY)])
-def test_who_refuses_when_ready_or_boots_for_ever_is_given_up(beats: tuple[Heartbeat, ...]) -> None:
-    desk = uploading("ardupilot")
-    while not desk.machine.outcome:
-        for beat in beats:
-            desk.tell(beat)
-            desk.tell(ack(MavResult.NO_SPACE))
-            desk.wait(1.0)
-        desk.tell(ack(MavResult.NO_SPACE))
-        desk.wait(1.6)
-        assert desk.now < (70 if BOOTING in beats else 10)
-    assert desk.machine.outcome.result == MavResult.NO_SPACE
 
 
 def test_nothing_more_is_written_once_the_vehicle_is_armed() -> None:
