@@ -183,6 +183,7 @@ class Result:
             "upper_bound": self.bound.value if self.bound else None,
             "upper_bound_exact": self.bound.exact if self.bound else None,
             "goal": _goal_as_dict(solution),
+            "height": _height_as_dict(solution),
             "shadowing": {"mean": under.mean, "quantiles": dict(under.quantiles)}
             if under
             else None,
@@ -240,6 +241,20 @@ def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
         else None,
         "optimizations": least.optimizations,
     }
+
+
+def _height_as_dict(solution: Solution) -> dict[str, Any] | None:
+    """Return which height was chosen, m, and what both ends of the choice deliver, bit/s/Hz."""
+    if (found := solution.height) is None:
+        return None
+    ends = {
+        name: {"altitude": at, "delivered_rate": None if end is None else end.delivered_rate}
+        for name, at, end in (
+            ("least", found.least, found.at_least),
+            ("most", found.most, found.at_most),
+        )
+    }
+    return {"altitude": solution.plan.flight.altitude, "tried": found.tried, **ends}
 
 
 def flight_as_dict(plan: Plan, flight: Prediction) -> dict[str, Any]:

@@ -305,5 +305,5 @@ def test_a_changed_plan_is_checked_and_its_text_is_its_own() -> None:
 def test_a_plan_is_not_replaced_past_its_check() -> None:
     plan = parse_plan(SMALL)
     with pytest.raises(InputError, match=r"plan\.changed"):
-        replace(plan, flight=replace(plan.flight, altitude=60))
+        replace(plan, flight=replace(plan.flight, duration=60))
     assert pickle.loads(pickle.dumps(plan)) == copy.deepcopy(plan) == plan

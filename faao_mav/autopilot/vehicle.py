@@ -147,6 +147,18 @@ class Vehicle:
             lands_on_return=self.type.hovers,
         )
 
+    @property
+    def fence_heights(self) -> tuple[float, float]:
+        """The least and the greatest height above home, m, that its own fence lets it be at."""
+        if "fence_height" in self.type.parameters:
+            high = self.value("fence_height")
+            return -math.inf, high if high > 0 else math.inf
+        kinds = int(self.value("fence_type")) if self.value("fence_enable") != 0 else 0
+        return (
+            self.value("fence_floor") if kinds & 8 else -math.inf,
+            self.value("fence_ceiling") if kinds & 1 else math.inf,
+        )
+
     def orbit(self, item: MissionItem) -> Orbit | None:
         """Return how it circles at `item`, None where it does not."""
         return self.type.orbits(self, self.type.dialect.sent(item))

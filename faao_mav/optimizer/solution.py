@@ -76,6 +76,20 @@ class Least:
 
 
 @dataclass(frozen=True)
+class BestHeight:
+    """What a choice of heights brought: they are `least` to `most`, m, of which so many were tried.
+
+    `at_least` and `at_most` are the solutions at both ends, None without a flight there.
+    """
+
+    least: float
+    most: float
+    at_least: "Solution | None"
+    at_most: "Solution | None"
+    tried: int
+
+
+@dataclass(frozen=True)
 class Solution:
     '''A solved plan: SI units, local east-north metres, one row per time slot.
 
@@ -91,7 +105,8 @@ class Solution:
     half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
     `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
     by how much the rate that it maximises is above that of the plan for the cutoff rate. `least`
-    tells of a plan whose `goal` minimises; it and the limit on the energy are not saved.
+    tells of a plan whose `goal` minimises, `height` of one that leaves it open; these two and the
+    limit on the energy are not saved.
 
     >>> from faao_mav import optimize, parse_plan
     >>> solution = optimize(parse_plan("""
@@ -126,6 +141,7 @@ class Solution:
     shares: Real | None = None
     gain: float | None = None
     least: Least | None = None
+    height: BestHeight | None = None
 
     def __repr__(self) -> str:
         """Say what was solved and found, in a line."""

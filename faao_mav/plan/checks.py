@@ -4,6 +4,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.model import PlanContents
-from faao_mav.plan.sections import Flight
+from faao_mav.plan.sections import Flight, Heights
 from faao_mav.power import RotaryWing
 from faao_mav.vector import chord
 
@@ -145,7 +146,8 @@ def _rates(plan: PlanContents) -> Iterator[str]:
 
 
 def _gain(plan: PlanContents) -> Iterator[str]:
-    radio, height = plan.radio, plan.flight.altitude
+    radio, asked = plan.radio, plan.flight.height
+    heights = asked if isinstance(asked, Heights) else (asked,)
     if radio.reliability is not None:
         told = f"radio.reliability: {radio.reliability:g}: "
         if all(law.spread_db is None for law in radio.gain_laws):
@@ -153,7 +155,7 @@ def _gain(plan: PlanContents) -> Iterator[str]:
         if plan.optimizer.method == "algorithm1":
             yield f"{told}algorithm1 (optimizer.method) knows no shadowing; give method direct"
     own = {"base_station": radio.base_station.gain, "ground_user": radio.ground_user.gain}
-    for law, name in zip(radio.path_gains, own, strict=True):
+    for (law, name), height in product(zip(radio.path_gains, own, strict=True), heights):
         at = law.best_distance(2 * MAX_LOCAL_DISTANCE, height)
         gain = float(law.db(np.array(at), height))
         if gain > 0:

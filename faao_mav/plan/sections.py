@@ -3,9 +3,17 @@
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, fields
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
-from pydantic import AfterValidator, Field, PlainValidator, TypeAdapter, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    Field,
+    PlainValidator,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+)
+from pydantic_core import PydanticCustomError
 
 from faao_mav.autopilot import Autopilot, Kind, autopilots, kinds, vehicle_type
 from faao_mav.autopilot.body import Body, CopterBody, PlaneBody
@@ -155,6 +163,31 @@ class VehicleOptions:
     battery: Battery | None = None
 
 
+class Heights(NamedTuple):
+    """Heights above the origin of which the best is to be found, from `least` to `most`, m."""
+
+    least: float
+    most: float
+
+
+_HEIGHT: TypeAdapter[float] = TypeAdapter(Annotated[Number, Field(ge=1, le=20000)])
+
+
+def _height(value: object) -> float | Heights:
+    """Check a height, or {least: height, most: height}."""
+    try:
+        if not isinstance(value, dict):
+            return _HEIGHT.validate_python(value)
+        if set(value) != {"least", "most"}:
+            raise ValueError("not {least: metres, most: metres}")
+        found = Heights(*(_HEIGHT.validate_python(value[end]) for end in ("least", "most")))
+    except ValidationError as error:
+        raise PydanticCustomError(str(error.errors()[0]["type"]), "not accepted") from None
+    if not found.least < found.most:
+        raise ValueError("the least is not below the most")
+    return found
+
+
 @section
 class Flight:
     """The flight that is optimised.
@@ -164,11 +197,12 @@ class Flight:
 
     start: Position = key("Where the flight starts, w_I.", "m")
     end: Position = key("Where the flight ends, w_F.", "m")
-    altitude: Number = key(
-        "Height H above the origin.",
-        "[1, 20000] m",
+    height: Annotated[float | Heights, PlainValidator(_height)] = key(
+        "Height H above the origin, or those of which the best is to be found.",
+        "m",
         "a height above the origin in metres, 1 (an aircraft that is lower has hardly left the "
-        "ground) to 20000",
+        "ground) to 20000, or {least: metres, most: metres}",
+        name="altitude",
     )
     duration: Number = key(
         "Duration T, a whole number of time steps; w_F is reached one step before its end.",
@@ -180,6 +214,11 @@ class Flight:
     bound_first_acceleration: Flag = key(
         "Whether a_max bounds a(0) too, which the paper leaves unbounded.", default=True
     )
+
+    @property
+    def altitude(self) -> float:
+        """The height H above the origin, m: the greatest until the best is found."""
+        return self.height.most if isinstance(self.height, Heights) else self.height
 
     @property
     def slots(self) -> int:

@@ -78,6 +78,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     solution, plan, fresh = result.solution, result.solution.plan, result.fresh
     rates, delivered, radio = solution.rates, solution.delivered_rate, plan.radio
     yield from _goal(solution)
+    yield from _height(solution)
     limit = result.saturation
     limiting = "alphabet" if solution.problem.uav_user.steps is None else "radio's rates"
     most = f", at most {limit.ceiling:.5g} by the {limiting}" if limit else ""
@@ -256,6 +257,27 @@ def _goal(solution: Solution) -> Iterator[Line]:
     else:
         delivered = _asked(below.plan, below.delivered_rate)
         yield "", f"{_minimised(below)} would deliver {delivered}"
+
+
+def _height(solution: Solution) -> Iterator[Line]:
+    """Yield which height was chosen, and what both ends of the choice would bring."""
+    if (found := solution.height) is None:
+        return
+    plan, ends = solution.plan, []
+    for at, end in ((found.least, found.at_least), (found.most, found.at_most)):
+        brings = "no flight" if end is None else _brought(end)
+        ends.append(f"{brings} at {at:g} m")
+    yield "height", f"{plan.flight.altitude:g} m for {_brought(solution)}; {', '.join(ends)}"
+
+
+def _brought(solution: Solution) -> str:
+    """Return what a solution is compared by with those of other heights."""
+    plan = solution.plan
+    if plan.goal.minimise is not None:
+        return _minimised(solution)
+    if plan.goal.maximise == "data":
+        return f"{solution.delivered_rate * plan.flight.duration:.5g} bit/Hz"
+    return f"{solution.delivered_rate if plan.radio.causal else solution.rates.R_avg:.4f} bit/s/Hz"
 
 
 def _minimised(solution: Solution) -> str:

@@ -100,12 +100,12 @@ def _cage(context: ValidationContext) -> Hits:
     """The bounds about home that FENCE_ENABLE and the bits of FENCE_TYPE switch on."""
     value = context.vehicle.value
     kinds = int(value("fence_type")) if value("fence_enable") != 0 else 0
-    ceiling, floor, radius = (value(f"fence_{key}") for key in ("ceiling", "floor", "radius"))
-    yield from _beyond(context, "ardupilot-fence-ceiling", "up", ceiling if kinds & 1 else None)
+    radius, (floor, ceiling) = value("fence_radius"), context.vehicle.fence_heights
+    yield from _beyond(context, "ardupilot-fence-ceiling", "up", ceiling)
     yield from _beyond(
         context, "ardupilot-fence-circle", "from_origin", radius if kinds & 2 else None
     )
-    for place in context.places if kinds & 8 else ():
+    for place in context.places:
         if place.up < floor and context.items[place.index].command != Command.NAV_LAND:
             yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
 
@@ -113,9 +113,9 @@ def _cage(context: ValidationContext) -> Hits:
 @checks("px4")
 def _px4_cage(context: ValidationContext) -> Hits:
     """The bounds about home that are on above 0."""
-    far, high = context.vehicle.value("fence_distance"), context.vehicle.value("fence_height")
+    far, high = context.vehicle.value("fence_distance"), context.vehicle.fence_heights[1]
     yield from _beyond(context, "px4-max-horizontal", "from_origin", far if far > 0 else None)
-    yield from _beyond(context, "px4-max-vertical", "up", high if high > 0 else None)
+    yield from _beyond(context, "px4-max-vertical", "up", high)
 
 
 @checks()
