@@ -254,6 +254,12 @@ class Problem:
         buffer = math.inf if room is None or bandwidth is None else 8 * room / bandwidth
         return RelayQueue(half=radio.duplex == "half", buffer=buffer)
 
+    def farthest(self, link: Link) -> float:
+        """Return how far from the station of `link` a flight can come at most, on the ground, m."""
+        kin = self.kinematics
+        away = np.hypot(*(np.stack([kin.start, kin.end])[:, None] - link.gains.station).T)
+        return float(away.max()) + kin.max_speed * kin.time_step * (kin.slots - 1) / 2
+
     @property
     def links(self) -> tuple[Link, Link]:
         """BS to UAV, UAV to user."""

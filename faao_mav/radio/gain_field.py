@@ -7,13 +7,14 @@ In natural logarithms, at a place w of the aircraft in slot n,
 with p_n the place of the station, which may move, and `above`, by default nothing, from a map.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.radio.gain import PER_DB, GainFunction
+from faao_mav.radio.gain_map import Grid
 
 
 class Surface(Protocol):
@@ -71,3 +72,26 @@ class GainField:
             gradient = gradient + PER_DB * np.stack([x, y])
             hessian = hessian + PER_DB * np.stack([xx, xy, yy])
         return gradient, hessian
+
+    def in_slot(self, slot: int) -> "GainField":
+        """Return the gain with the station where it is in a `slot`."""
+        return replace(self, station=self.station[slot]) if self.station.ndim > 1 else self
+
+    def extremes(self, farthest: float) -> tuple[float, float]:
+        """Return what l is not below and not above up to `farthest` m from the station."""
+        found = self._by_law(self.law.turns(farthest, self.height))
+        above = PER_DB * self.above.values if isinstance(self.above, Grid) else np.zeros(1)
+        return float(found.min() + above.min()), float(found.max() + above.max())
+
+    def most_between(self, near: Real, far: Real) -> Real:
+        """Return the most of l (...) by the law at distances from `near` to `far` (...), m."""
+        most = np.maximum(self._by_law(near), self._by_law(far))
+        for turn in self.law.turns(float(far.max()), self.height)[1:-1]:
+            most = np.where(
+                (near < turn) & (turn < far), np.maximum(most, self._by_law(turn)), most
+            )
+        return most
+
+    def _by_law(self, distance: Real) -> Real:
+        """Return l (...) by the law at distances on the ground (...), m."""
+        return np.asarray(self.law.log(distance**2 + self.height**2, self.height))

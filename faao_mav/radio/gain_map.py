@@ -90,6 +90,19 @@ class Grid:
         none = np.zeros_like(f_x)
         return self.value(x, y), f_x, f_y, none, (far - near) / (dx * dy), none
 
+    def most_between(self, x: Real, y: Real) -> Real:
+        """Return the most of f in the boxes between rising x (i + 1,) and y (j + 1,), (i, j), m."""
+        lines = [
+            np.union1d(edges, grid[(grid > edges[0]) & (grid < edges[-1])])
+            for edges, grid in ((x, self.x), (y, self.y))
+        ]
+        most = self.value(lines[0][:, None], lines[1])  # f is highest in a corner of a piece
+        for axis, (edges, line) in enumerate(zip((x, y), lines, strict=True)):
+            first = np.searchsorted(line, edges)
+            inside = np.maximum.reduceat(most, first[:-1], axis=axis)
+            most = np.maximum(inside, most.take(first[1:], axis=axis))
+        return np.asarray(most)
+
     def smoothed(self) -> Spline:
         """Return the bicubic spline through the grid smoothed over a cell."""
         padded = np.pad(self.values, 1, mode="edge")

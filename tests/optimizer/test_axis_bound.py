@@ -15,7 +15,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.axis_bound import AxisBound
-from faao_mav.optimizer.search.bound import radial_rates
+from faao_mav.optimizer.search.best_rates import best_rates
 from faao_mav.plan import parse_plan
 
 FREE = {
@@ -38,7 +38,7 @@ def bounded(small_plan: MakePlan) -> dict[str, AxisBound]:
     found = {}
     for kind, changes in KINDS.items():
         problem = build_problem(small_plan(faint | changes))
-        found[kind] = AxisBound(problem, radial_rates(problem)[0], 6, 4)
+        found[kind] = AxisBound(problem, best_rates(problem), 6, 4)
     return found
 
 
@@ -105,7 +105,7 @@ def test_the_paper_s_plan_at_10_dbm_is_within_an_eighth_of_it() -> None:
     changes = powers | {"optimizer.method": "direct", "flight.time_step": 0.5}
     plan = parse_plan(edited((MISSIONS / "paper_active.yaml").read_text(), changes))
     problem, reached = build_problem(plan), optimize(plan).rates.R_avg
-    cells = AxisBound(problem, radial_rates(problem)[0], 6, 8)
+    cells = AxisBound(problem, best_rates(problem), 6, 8)
     assert reached < cells.bound([0.45, 0.55]) < 1.125 * reached
 
 

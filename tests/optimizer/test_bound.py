@@ -15,8 +15,8 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.axis_bound import axis_bound
-from faao_mav.optimizer.search.best_rates import best_rates
-from faao_mav.optimizer.search.bound import radial_rates, upper_bound
+from faao_mav.optimizer.search.best_rates import best_at, best_rates
+from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import map_bound
 from faao_mav.plan import read_plan
 
@@ -75,8 +75,8 @@ def test_no_flight_is_above_the_bounds_under_another_law(
     w = np.stack([*flights, best.w.T], axis=1)
     most = rate_field(problem, design(plan)).value(w).mean(axis=-1).min(axis=0).max()
     assert most == pytest.approx(best.rates.R_avg, abs=1e-4)
-    rates, _ = radial_rates(problem)
-    found = map_bound(problem, rates, cells=1500), axis_bound(problem, rates)
+    rates = best_rates(problem)
+    found = map_bound(problem, rates), axis_bound(problem, rates)
     assert most <= min(found) <= 1.25 * most
 
 
@@ -124,8 +124,7 @@ def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> N
         problem = build_problem(small_plan(FAINT | {"radio.line_of_sight": kind}))
         link = problem.uav_user
         w = link.gains.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
-        r = np.linalg.norm(w - link.gains.station, axis=1)
-        values, exact = best_rates(problem, link, r[:, None])
+        values, exact = best_at(problem, link, link.gains.log(w.T)[:, None])
         H = link.channel(w, link.small_scale(w))
         true = link.draw_rates(H, link.best(H[:, None]))
         assert exact

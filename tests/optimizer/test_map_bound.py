@@ -17,8 +17,8 @@ from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.search.bound import radial_rates
-from faao_mav.optimizer.search.map_bound import MapBound, RadialRates, map_bound
+from faao_mav.optimizer.search.best_rates import BestRates, best_rates
+from faao_mav.optimizer.search.map_bound import MapBound, map_bound
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import Cells, cells_of
 from faao_mav.plan import parse_plan
@@ -94,11 +94,11 @@ def test_an_outward_map_misses_no_flight(small_plan: MakePlan, seed: int) -> Non
 
 @dataclass(frozen=True)
 class Bounded:
-    """A problem, its rates, those of the bound by distance, and its bound on a coarse map."""
+    """A problem, its rates, those of the bound by the gain, and its bound on a coarse map."""
 
     problem: Problem
     field: RateField
-    radial: RadialRates
+    best: BestRates
     bound: float
 
     def value(self, w: Real) -> float:
@@ -113,13 +113,13 @@ def bounded(small_plan: MakePlan) -> dict[str, Bounded]:
     for kind, changes in KINDS.items():
         faint = {"radio.base_station.power_dbm": 3, "radio.fading": "none"}
         problem = build_problem(small_plan(faint | changes))
-        radial = radial_rates(problem)[0]
+        best = best_rates(problem)
         field = rate_field(problem, design(problem.plan))
         found[kind] = Bounded(
             problem,
             field,
-            radial,
-            map_bound(problem, radial, cells=2000 if kind == "fence" else 300),
+            best,
+            map_bound(problem, best, cells=2000 if kind == "fence" else 300),
         )
     return found
 
@@ -155,7 +155,7 @@ def test_every_price_bounds_what_is_delivered(
 ) -> None:
     one = bounded[kind]
     straight = straight_flight(one.problem.kinematics)
-    found = MapBound.over(one.problem, one.radial, 200, 5.0).bound([price])
+    found = MapBound.over(one.problem, one.best, 200, 5.0).bound([price])
     assert found >= one.value(straight.w)
 
 
@@ -166,4 +166,4 @@ def test_a_wall_lowers_the_bound(bounded: dict[str, Bounded]) -> None:
 def test_the_copter_s_plan_is_within_three_hundredths_of_the_bound() -> None:
     plan = parse_plan((MISSIONS / "copter_relay.yaml").read_text())
     problem, reached = build_problem(plan), optimize(plan).delivered_rate
-    assert reached < map_bound(problem, radial_rates(problem)[0], cells=15_000) < 1.03 * reached
+    assert reached < map_bound(problem, best_rates(problem), cells=15_000) < 1.03 * reached

@@ -53,17 +53,11 @@ def rate_field(problem: Problem, design: Design, width: float | None = None) -> 
     Steps of the radio's own rates rise over `width` dB, by default so wide that there is no flat
     between them.
     """
-    kin = problem.kinematics
     links = problem.links
     if isinstance(steps := links[0].steps, RateSteps):
         steps = steps.widened(width or max(steps.gap, _LEAST_WIDTH))
         links = replace(links[0], steps=steps), replace(links[1], steps=steps)
-    reach = kin.max_speed * kin.time_step * (kin.slots - 1)
-    farthest = []
-    for link in links:
-        from_ends = max(np.linalg.norm(end - link.gains.station) for end in (kin.start, kin.end))
-        farthest.append(float(from_ends) + reach / 2)
-    return RateField(links, rate_models(links, design, farthest))
+    return RateField(links, rate_models(links, design, [problem.farthest(link) for link in links]))
 
 
 def rate_models(
@@ -77,8 +71,7 @@ def rate_models(
     for link, distance in zip(links, farthest, strict=True):
         if kind_of(link, design):
             tabled.append(link)
-            turns = link.gains.law.turns(distance, link.gains.height)
-            spans.append(link.gains.law.log(turns**2 + link.gains.height**2, link.gains.height))
+            spans.append(np.array(link.gains.extremes(distance)))
     tables = iter(table_rates(tabled, design, spans))
     return tuple(
         next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links

@@ -15,7 +15,8 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.search.map_bound import RadialRates, at_ends, best_price
+from faao_mav.optimizer.search.best_rates import BestRates
+from faao_mav.optimizer.search.map_bound import at_ends, best_price
 from faao_mav.optimizer.search.sweep import largest_within
 
 _BEYOND = 40.0
@@ -61,7 +62,7 @@ class AxisBound:
     """
 
     problem: Problem
-    rates: RadialRates
+    rates: BestRates
     speeds: int
     parts: int = 1
 
@@ -187,16 +188,16 @@ class AxisBound:
             most = int(np.abs(shifts).max())
             table = self.x[0] + part * np.arange(-most, _PARTS * (rows - 1) + most + 1)
             inner = most + shifts[:, None] + _PARTS * np.arange(rows)
-            for link, station in enumerate(self.places[0][2:]):
-                away = station - table
+            for link, hop in enumerate(self.problem.links):
+                away = self.places[0][2 + link] - table
                 # beyond the first row, any place; beyond the last, any too
-                for columns, gone in (
-                    (slice(1, -1), np.abs(away)),
-                    (slice(0, 1), away),
-                    (slice(-1, None), -away),
+                gone = np.maximum(0.0, np.stack([np.abs(away), away, -away]) - off)
+                near = np.hypot(gone[:, None], across[:, slot, None])
+                gain = hop.gains.most_between(near, np.array(self.problem.farthest(hop)))
+                rates = self.rates.at(link, slot, gain)
+                for columns, rate in zip(
+                    (slice(1, -1), slice(0, 1), slice(-1, None)), rates, strict=True
                 ):
-                    distance = np.hypot(np.maximum(0.0, gone - off), across[:, slot, None])
-                    rate = self.rates.at(link, slot, distance)
                     found[link, :, 0, :, columns] += rate[:, inner[:, columns]]
         worth = prices[:, None, None] * found[0] + (1 - prices[:, None, None]) * found[1]
         return np.where(self._alive(k), worth, -np.inf)
@@ -295,11 +296,11 @@ class AxisBound:
 
 
 def axis_bound(
-    problem: Problem, rates: RadialRates, *, coarse: int = _COARSE, fine: int = _FINE
+    problem: Problem, rates: BestRates, *, coarse: int = _COARSE, fine: int = _FINE
 ) -> float:
     """Return an upper bound on R_avg of all flights, bit/s/Hz, full duplex only.
 
-    `rates` are upper bounds on the best rates by distance. With larger `fine` the bound is tighter;
+    `rates` are upper bounds on the best rates. With larger `fine` the bound is tighter;
     time grows with its cube. The price is sought in cells of `coarse`.
     """
     price = best_price(AxisBound(problem, rates, coarse).bound)

@@ -1,6 +1,6 @@
-"""The best rate of a link over its distance: what every bound rests on."""
+"""The best rates of the links over the gain: what every bound rests on."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,55 @@ _WIDTH = 0.25
 """Decibels before its SNR over which a step of a radio's own rates rises in a bound. Chosen."""
 
 
-def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
-    """Return the best rate of every slot at distances r (n, m), bits, and whether it is exact.
+_GAINS, _KNOWN_GAINS = 2_000, 300
+"""Gains at which rates are tabulated, and those with a draw known for every slot. Chosen."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BestRates:
+    """Upper bounds on the best rates of both links by l: they rise with it.
+
+    `values` (2, slots or 1, m) at evenly rising l, `gain_logs` (2, m), bits; `exact` tells that the
+    best precoders have a closed form.
+    """
+
+    gain_logs: Real
+    values: Real
+    exact: bool
+
+    @property
+    def known(self) -> bool:
+        """Whether each slot has rates of its own, of known draws."""
+        return len(self.values[0]) > 1
+
+    def at(self, link: int, slot: int, gain_log: Real) -> Real:
+        """Return the most that `link` has in `slot` at l up to `gain_log` (...), bits."""
+        row = self.values[link, slot if self.known else 0]
+        found = np.interp(gain_log.ravel(), self.gain_logs[link], row)
+        return np.asarray(found.reshape(gain_log.shape))
+
+
+def best_rates(problem: Problem) -> BestRates:
+    """Return upper bounds on the best rates at all gains that a flight can have."""
+    links = problem.links
+    known = any(link.nlos is not None and not link.averaged for link in links)
+    gain_logs, values, exact = [], [], True
+    for link in links:
+        ends = link.gains.extremes(problem.farthest(link))
+        gain_log = np.linspace(*ends, _KNOWN_GAINS if known else _GAINS)
+        slots = problem.kinematics.slots if known else 1
+        best, is_exact = best_at(problem, link, np.broadcast_to(gain_log, (slots, len(gain_log))))
+        # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being
+        # known on the grid only.
+        best = best + np.abs(np.diff(best, 2, axis=1)).max(axis=1, keepdims=True) / 4
+        gain_logs.append(gain_log)
+        values.append(np.maximum.accumulate(best, axis=1))
+        exact &= is_exact
+    return BestRates(np.stack(gain_logs), np.stack(values), exact)
+
+
+def best_at(problem: Problem, link: Link, gain_log: Real) -> tuple[Real, bool]:
+    """Return the best rate of every slot at l (n, m), bits, and whether it is exact.
 
     Where a draw is known for every slot and the channel depends on the direction, the result is an
     upper bound: each singular value of H_r is the largest over all directions.
@@ -31,10 +78,10 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     exact = link.closed_form and link.measure == "cutoff"
     if link.steps is not None:
         link = replace(link, steps=link.steps.above(_WIDTH))
-    gain_log = link.gains.law.log(r**2 + link.gains.height**2, link.gains.height).T
+    slots, gain_log = len(gain_log), gain_log.T
     if link.nlos is not None and not optimal.averaged:
-        singular = _largest_singular_values(link, len(r))
-        H_r = np.zeros((len(r), link.receive, link.transmit), dtype=np.complex128)
+        singular = _largest_singular_values(link, slots)
+        H_r = np.zeros((slots, link.receive, link.transmit), dtype=np.complex128)
         k = np.arange(singular.shape[1])
         H_r[:, k, k] = singular
         link = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
@@ -46,7 +93,7 @@ def best_rates(problem: Problem, link: Link, r: Real) -> tuple[Real, bool]:
     from scipy.interpolate import CubicSpline
 
     levels = np.linspace(gain_log.min(), gain_log.max(), _SEARCHED)
-    each, every = SlotRate(link, optimal), np.ones(len(r))
+    each, every = SlotRate(link, optimal), np.ones(slots)
     rates = [each.value(level * every, every) for level in levels]
     return np.asarray(CubicSpline(levels, rates)(gain_log[:, 0])).T, exact
 

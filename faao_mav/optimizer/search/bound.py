@@ -1,10 +1,11 @@
 """An estimated upper bound on what a plan maximises, over all flights and precoders.
 
-It is no proof: the best rates over the distance, on which it rests, are tabulated to about 1e-6
-bit, and precoders without a closed form are those of a local search. Given these rates, each of two
+It is no proof: the best rates over the gain, on which it rests, are tabulated to about 1e-6 bit,
+and precoders without a closed form are those of a local search. Given these rates, each of two
 bounds holds for every flight; which are computed is said by the plan. `map_bound` knows the queue,
-half duplex and fences, and flights by their greatest speed alone. `axis_bound` knows accelerations
-along the line through the stations, for aircraft that these limit.
+half duplex and fences, maps of gains and stations that move, and flights by their greatest speed
+alone. `axis_bound` knows accelerations along the line through the stations, for aircraft that these
+limit; it is for gains by the distance from stations at rest.
 """
 
 from dataclasses import dataclass
@@ -14,11 +15,8 @@ import numpy as np
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.axis_bound import axis_bound
 from faao_mav.optimizer.search.best_rates import best_rates
-from faao_mav.optimizer.search.map_bound import RadialRates, map_bound
+from faao_mav.optimizer.search.map_bound import map_bound
 from faao_mav.optimizer.solution import Observer, Progress
-
-_DISTANCES, _KNOWN_DISTANCES = 2_000, 300
-"""Distances at which rates are tabulated, and those with a draw known for every slot. Chosen."""
 
 _TIGHT = 0.03
 """How far above the known plan, as a share of it, a bound may be without another being tried.
@@ -53,46 +51,26 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
             observe(Progress(number, 2, stage, best))
 
     tell(0, "the best rates", known)
-    rates, exact = radial_rates(problem)
+    rates = best_rates(problem)
     ceiling = min(link.most for link in problem.links)
     relay, kin = problem.maximised_queue, problem.kinematics
     half = relay is not None and relay.half
     value = ceiling
     if value > (1 + _TIGHT) * known:
-        corners = np.vstack([kin.start, kin.end, *(link.gains.station for link in problem.links)])
+        fields = [link.gains for link in problem.links]
+        corners = np.vstack([kin.start, kin.end, *(field.station for field in fields)])
         extent = float(np.ptp(corners, axis=0).max())
         # there is no way from rest to v_max and back to rest
         accelerating = kin.max_speed**2 / kin.max_acceleration > extent
-        if accelerating and not half:
+        radial = all(field.above is None and field.station.ndim == 1 for field in fields)
+        if accelerating and not half and radial:
             tell(1, "the bound by the axis", value)
             value = min(value, axis_bound(problem, rates))
         # the axis takes the most of all larger distances: with a gain that rises there, too much
-        other = any(not link.gains.law.square for link in problem.links)
-        if not accelerating or half or problem.free_area is not None or other:
+        other = any(not field.law.square for field in fields)
+        if not accelerating or half or problem.free_area is not None or other or not radial:
             tell(1, "the bound over the map", value)
             value = min(value, map_bound(problem, rates))
         value = max(known, value)
     tell(2, "the bound", value)
-    return Bound(value, exact)
-
-
-def radial_rates(problem: Problem) -> tuple[RadialRates, bool]:
-    """Return upper bounds on the best rates by distance, and whether the best ones are exact."""
-    kin, links = problem.kinematics, problem.links
-    known = any(link.nlos is not None and not link.averaged for link in links)
-    ends = [np.hypot(*(end - link.gains.station)) for end in (kin.start, kin.end) for link in links]
-    r = np.linspace(
-        0.0,
-        float(max(ends)) + float(kin.longest_ways()[0][-1]) / 2,
-        _KNOWN_DISTANCES if known else _DISTANCES,
-    )
-    values, exact = [], True
-    for link in links:
-        best, is_exact = best_rates(
-            problem, link, np.broadcast_to(r, (kin.slots if known else 1, len(r)))
-        )
-        # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being
-        # known on the grid only.
-        values.append(best + np.abs(np.diff(best, 2, axis=1)).max(axis=1, keepdims=True) / 4)
-        exact &= is_exact
-    return RadialRates(float(r[1]), np.stack(values)), exact
+    return Bound(value, rates.exact)

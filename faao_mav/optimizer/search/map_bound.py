@@ -9,7 +9,6 @@ duplex a slot has the larger of the two terms. The best flight at a price, by po
 sweep over the `Cells` of a map: whatever the price, its value is above every flight.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,8 +16,12 @@ from functools import cached_property
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.search.sweep import CORNER, Cells, cells_of
+from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.search.best_rates import BestRates
+from faao_mav.optimizer.search.sweep import CORNER, Cells, cells_of, disc, largest_near
+from faao_mav.radio.gain import PER_DB
+from faao_mav.radio.gain_field import GainField
+from faao_mav.radio.gain_map import Grid
 
 _DIRECTIONS = 3
 """Velocities between 0 and v_max along each axis that a run of slots is flown at. Chosen: with 2
@@ -35,37 +38,20 @@ _APART = (-0.01, 0.0, 0.01)
 """Prices of the bound beside the best one: a place at which one of them is high has another that is
 low. Chosen."""
 
+_PARTS, _MOST_PARTS = 3, 1_000_000
+"""Parts of the radius of a disc over which the most of a map is found, by boxes of that side, and
+how many boxes there are at most. Chosen."""
+
 _GOLDEN, _SECTIONS = (5**0.5 - 1) / 2, 9
 """Golden section of the price, and how often: it is found to 0.01. Chosen."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RadialRates:
-    """Upper bounds on the best rates of both links by the horizontal distance from the station.
-
-    `values` (2, slots or 1, m) at distances of 0, `step`, 2 `step` ..., bits.
-    """
-
-    step: float
-    values: Real
-
-    def at(self, link: int, slot: int, distance: Real, beyond: float = math.inf) -> Real:
-        """Return the most of `link` in `slot` from `distance` (...), m, to so much `beyond` it."""
-        from scipy.ndimage import maximum_filter1d  # with the bounds, not before
-
-        row = self.values[link, slot if self.values.shape[1] > 1 else 0]
-        size = 2 + math.ceil(min(beyond / self.step, len(row)))
-        row = maximum_filter1d(row, size, origin=-(size // 2), mode="nearest")
-        grid = self.step * np.arange(len(row))
-        return np.asarray(np.interp(distance.ravel(), grid, row).reshape(distance.shape))
-
-
-def at_ends(problem: Problem, rates: RadialRates, price: float) -> float:
+def at_ends(problem: Problem, rates: BestRates, price: float) -> float:
     """Return what the first and the last slot are worth at a `price`, bits."""
     kin, links = problem.kinematics, problem.links
     (U_0, U_1), (G_0, G_1) = (
         [
-            float(rates.at(j, slot, np.array([np.hypot(*(end - link.gains.station))]), 0.0)[0])
+            float(rates.at(j, slot, link.gains.in_slot(slot).log(end[:, None]))[0])
             for slot, end in ((0, kin.start), (-1, kin.end))
         ]
         for j, link in enumerate(links)
@@ -95,15 +81,15 @@ class MapBound:
     """The cells of a problem, and what they are worth at a price."""
 
     problem: Problem
-    rates: RadialRates
+    rates: BestRates
     cells: Cells
 
     @classmethod
-    def over(cls, problem: Problem, rates: RadialRates, cells: int, reach: float) -> "MapBound":
+    def over(cls, problem: Problem, rates: BestRates, cells: int, reach: float) -> "MapBound":
         """Return the bound of `problem` over about so many cells, and steps of `reach` cells."""
-        stations = np.array([link.gains.station for link in problem.links])
+        places = np.vstack([_about(problem, link) for link in problem.links])
         kin, free = problem.kinematics, problem.free_area
-        return cls(problem, rates, cells_of(kin, stations, cells, reach, free))
+        return cls(problem, rates, cells_of(kin, places, cells, reach, free))
 
     @cached_property
     def _rates(self) -> dict[int, Real]:
@@ -113,7 +99,7 @@ class MapBound:
         velocities are one, which stands for all. The slots of a run are added up, to one part,
         unless they are shared (half duplex).
         """
-        known = self.rates.values.shape[1] > 1
+        known = self.rates.known
         runs = enumerate(self.cells.blocks)
         found = {(k if known else len(run)): k for k, run in runs}
         return {key: self._of_run(k, known=known) for key, k in found.items()}
@@ -134,11 +120,10 @@ class MapBound:
             tau = slot * kin.time_step - float(cells.instants[k])
             # how far w_n may be from where the cell's centre and the velocity would have it
             off = CORNER * cells.side + gap * abs(tau) + kin.max_acceleration * tau**2 / 2
+            places = cells.x[:, None] + tau * velocities.T[:, :, None, None]
             for j, link in enumerate(self.problem.links):
-                for i, v in enumerate(velocities):
-                    place = (link.gains.station - v * tau)[:, None, None]
-                    away = np.maximum(0.0, np.hypot(*(cells.x - place)) - off)
-                    found[j, number % parts, i] += self.rates.at(j, slot, away, 2 * off)
+                gain = most_gain(link.gains.in_slot(slot), places, off)
+                found[j, number % parts] += self.rates.at(j, slot, gain)
         return found
 
     @property
@@ -151,7 +136,7 @@ class MapBound:
 
         Through each cell at an instant a flight is worth no more than at any of the prices.
         """
-        known = self.rates.values.shape[1] > 1
+        known = self.rates.known
         p = np.clip(np.array(prices), 0.0, 1.0)[:, None, None, None, None]
         worth = {}
         for key, (received, forwarded) in self._rates.items():
@@ -167,10 +152,59 @@ class MapBound:
         return float(best) / self.problem.kinematics.slots
 
 
-def map_bound(problem: Problem, rates: RadialRates, *, cells: int | None = None) -> float:
+def _about(problem: Problem, link: Link) -> Real:
+    """Return places (k, 2), m: beyond a box about them and the ends the gain only falls outwards.
+
+    They are the station, as far about it as the gain by its law rises with the distance, and the
+    corners of a map; what no flight can reach of them is drawn nearer.
+    """
+    kin, field = problem.kinematics, link.gains
+    turns = field.law.turns(problem.farthest(link), field.height)
+    gains = field.most_between(turns, turns)
+    rising = turns[-1] if gains[-1] > gains[-2] else turns[-2]
+    found = field.station.reshape(-1, 2)
+    if rising > 0:
+        found = np.concatenate([found - rising, found + rising])
+    if isinstance(field.above, Grid):
+        corners = np.array([[side[0], side[-1]] for side in (field.above.x, field.above.y)])
+        found = np.concatenate([found, corners.T])
+    elif rising == 0:
+        return found
+    apart, way = np.abs(kin.end - kin.start), float(kin.longest_ways()[0][-1])
+    middle, half = (
+        (kin.start + kin.end) / 2,
+        np.sqrt(np.maximum(0.0, way**2 - apart[::-1] ** 2)) / 2,
+    )
+    return np.asarray(np.clip(found, middle - half, middle + half))
+
+
+def most_gain(field: GainField, w: Real, off: float) -> Real:
+    """Return upper bounds on l within `off` m, above 0, of places w (2, ...), of a station at rest.
+
+    That is the most by the law and the most of the map within so far.
+    """
+    distance = np.hypot(*field.away(w))
+    most = field.most_between(np.maximum(0.0, distance - off), distance + off)
+    if field.above is None:
+        return most
+    low, high = (each(w.reshape(2, -1), axis=1) for each in (np.min, np.max))
+    side = max(off / _PARTS, float(np.sqrt(np.prod(high - low + 2 * off) / _MOST_PARTS)))
+    rows = disc(off / side)
+    margin = rows[-1][0] + 1
+    edges = [
+        first + side * np.arange(-margin, int((last - first) / side) + margin + 2)
+        for first, last in zip(low, high, strict=True)
+    ]
+    assert isinstance(field.above, Grid)
+    within = largest_near(field.above.most_between(*edges), rows)
+    i, j = (((x - first) / side).astype(np.intp) + margin for x, first in zip(w, low, strict=True))
+    return np.asarray(most + PER_DB * within[i, j])
+
+
+def map_bound(problem: Problem, rates: BestRates, *, cells: int | None = None) -> float:
     """Return an upper bound on what `problem` maximises, bit/s/Hz, over all flights.
 
-    `rates` are upper bounds on the best rates by distance. With more `cells` of the map the bound
+    `rates` are upper bounds on the best rates. With more `cells` of the map the bound
     is tighter; it takes as many times longer.
     """
     if cells is None:

@@ -7,7 +7,7 @@ through how far the flight comes from its ends, fences by cells that are left ou
 are rounded outwards, so that no flight is missed.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,9 +58,9 @@ class Cells:
         out = np.empty_like(rewards)
         out[-1] = rewards[-1]
         for k in range(len(rewards) - 2, -1, -1):
-            after = self._near(out[k + 1])
+            after = largest_near(out[k + 1], self.rows)
             for _ in range(self.stages - 1):
-                after = self._near(np.where(self.free, after, -np.inf))
+                after = largest_near(np.where(self.free, after, -np.inf), self.rows)
             out[k] = rewards[k] + after
         return out
 
@@ -70,19 +70,33 @@ class Cells:
         with np.errstate(invalid="ignore"):  # -inf - -inf: nobody comes there
             return np.nan_to_num(after + before - rewards, nan=-np.inf, neginf=-np.inf)
 
-    def _near(self, values: Real) -> Real:
-        """Return the largest of `values` (..., i, j) in reach of one stage."""
-        best = np.full_like(values, -np.inf)
-        within = largest_within(values, (columns for _, columns in self.rows))
-        for rows, columns in self.rows:
-            near = within[columns]
-            if rows == 0:
-                np.maximum(best, near, out=best)
-            elif rows < values.shape[-2]:
-                above, below = best[..., rows:, :], best[..., :-rows, :]
-                np.maximum(above, near[..., :-rows, :], out=above)
-                np.maximum(below, near[..., rows:, :], out=below)
-        return best
+
+def disc(step: float) -> list[tuple[int, int]]:
+    """Return rows to either side, and columns there, from any point of a cell `step` sides away.
+
+    >>> disc(1.5)
+    [(0, 2), (1, 2), (2, 2)]
+    """
+    return [
+        (row, int(np.sqrt(step**2 - max(0, row - 1) ** 2)) + 1)
+        for row in range(int(step) + 2)
+        if row - 1 <= step
+    ]
+
+
+def largest_near(values: Real, rows: Sequence[tuple[int, int]]) -> Real:
+    """Return the largest of `values` (..., i, j) in a `disc` of `rows` about each place."""
+    best = np.full_like(values, -np.inf)
+    within = largest_within(values, (columns for _, columns in rows))
+    for row, columns in rows:
+        near = within[columns]
+        if row == 0:
+            np.maximum(best, near, out=best)
+        elif row < values.shape[-2]:
+            above, below = best[..., row:, :], best[..., :-row, :]
+            np.maximum(above, near[..., :-row, :], out=above)
+            np.maximum(below, near[..., row:, :], out=below)
+    return best
 
 
 def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
@@ -100,15 +114,15 @@ def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
 
 
 def cells_of(
-    kin: Kinematics, stations: Real, cells: int, reach: float, free: FreeArea | None = None
+    kin: Kinematics, places: Real, cells: int, reach: float, free: FreeArea | None = None
 ) -> Cells:
     """Return about so many `cells`, with steps that reach about so many, for flights of `kin`.
 
-    The map is a box about the ends, the `stations` (k, 2) and obstacles. A flight beyond it has a
-    projection on it that is never farther from a station, keeps the limits used here, and meets no
-    obstacle. `free` is where the aircraft may be, everywhere if None.
+    The map is a box about the ends, `places` (k, 2), m, and obstacles. A flight beyond it has a
+    projection on it that keeps the limits used here and meets no obstacle; with the right `places`
+    it has no less gain. `free` is where the aircraft may be, everywhere if None.
     """
-    corners = np.vstack([kin.start, kin.end, stations])
+    corners = np.vstack([kin.start, kin.end, places])
     since, until = kin.longest_ways()
     if free is not None:
         corners = np.vstack([corners, _edges(free, kin, float(since[-1]))])
@@ -140,13 +154,7 @@ def cells_of(
         inside = area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
     stages = 1 if free is None else max(1, round(reach / _FENCED_REACH))
     step = kin.max_speed * float(np.diff(instants).max(initial=0.0)) / side / stages
-    # from any point of one cell to any point of another
-    rows = [
-        (row, int(np.sqrt(step**2 - max(0, row - 1) ** 2)) + 1)
-        for row in range(int(step) + 2)
-        if row - 1 <= step
-    ]
-    return Cells(x, side, blocks, instants, alive & inside, rows, stages, inside)
+    return Cells(x, side, blocks, instants, alive & inside, disc(step), stages, inside)
 
 
 def _edges(free: FreeArea, kin: Kinematics, reach: float) -> Real:
