@@ -264,8 +264,7 @@ def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
         "site.origin.latitude", "site.origin.longitude", "site.wind.speed", "site.wind.from",
         "vehicle.max_speed", "vehicle.max_acceleration", "vehicle.battery.capacity_wh",
         "flight.start", "flight.end",
-        "flight.altitude", "flight.duration", "radio.base_station.position",
-        "radio.ground_user.position", "radio.rates.snr_db",
+        "flight.altitude", "flight.duration", "radio.rates.snr_db",
         "fence.inclusion.center", "fence.inclusion.radius", "fence.inclusion.polygon",
         "fence.exclusion.center", "fence.exclusion.radius", "fence.exclusion.polygon",
     ]  # fmt: skip

@@ -125,7 +125,7 @@ def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("table", "told"),
     [
-        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s or bit_per_s_per_hz"),
+        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s, or"),
         ("snr,rate\n1,2\n", "line 1: columns 'snr, rate'"),
         ("snr_db,mbit_per_s,bit_per_s_per_hz\n1,2,3\n", "line 1: columns"),
         ("# x\nsnr_db,mbit_per_s\n1,2\n3,fast\n", "line 4: mbit_per_s: 'fast' is no number"),

@@ -161,7 +161,7 @@ def _routes(
     and `known`, that of a similar plan, or this `alone`.
     """
     kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
-    stations = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
+    stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
     names = ("straight",) if alone else problem.plan.optimizer.starts
     routes = starts(kin, names, stations, problem.free_area, fenced)
     if before is not None:

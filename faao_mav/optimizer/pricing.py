@@ -168,8 +168,9 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     found, rates = [], []
     for link, P in zip(problem.links, (solution.P_B, solution.P_U), strict=True):
         nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
-        fresh = replace(link, nlos=nlos.reshape(draws, len(w), link.receive, link.transmit))
-        H = link.channel(w, fresh.small_scale(w))
+        nlos = nlos.reshape(draws, len(w), link.receive, link.transmit)
+        fresh = replace(link, nlos=nlos, gains=link.gains.in_slots(chosen))
+        H = fresh.channel(w, fresh.small_scale(w))
         P = P[chosen] if how.blind else how.precoders(link, H)
         at = np.maximum(0.0, link.draw_rates(H, P))
         rates.append(at)

@@ -13,7 +13,8 @@ from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.optimizer.size import check_size
-from faao_mav.plan import Plan, Vector
+from faao_mav.plan import Plan
+from faao_mav.plan.station import Station
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.channel import (
     balanced_rayleigh,
@@ -136,7 +137,11 @@ class Link:
 
     def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
         """Return the rate of every slot, bits (N + 2,), its mean where H_r has draws."""
-        rates = self.draw_rates(self.channel(w, H_r), P)
+        return self.mean_rates(self.channel(w, H_r), P)
+
+    def mean_rates(self, H: Complex, P: Complex) -> Real:
+        """Return the rates of `draw_rates`, bits (...), their mean where H has draws."""
+        rates = self.draw_rates(H, P)
         return np.asarray(rates.mean(axis=0)) if self.averaged else rates
 
     def draw_rates(self, H: Complex, P: Complex) -> Real:
@@ -298,18 +303,19 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
     radio, slots = plan.radio, plan.flight.slots
     laws = (parts["gain"],) * 2 if "gain" in parts else radio.path_gains
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
-    rng = np.random.default_rng(radio.seed)
+    rng, t = np.random.default_rng(radio.seed), plan.flight.time_step * np.arange(float(slots))
 
     def link(
         name: str,
         to_relay: bool,
-        position: Vector,
+        station: Station,
         receive: int,
         transmit: int,
         power: float,
         noise: float,
         law: GainFunction,
     ) -> Link:
+        places = station.at(t) if station.moves else np.array(station.position)
         match radio.fading:
             case "realization":
                 nlos: Complex | None = rayleigh(rng, slots, receive, transmit)
@@ -319,7 +325,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
                 nlos = None
         return Link(
             name=name,
-            gains=GainField(law, np.array(position), plan.flight.altitude),
+            gains=GainField(law, places, plan.flight.altitude),
             to_relay=to_relay,
             power=power,
             noise=noise,
@@ -339,7 +345,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
         bs_uav=link(
             "base station to UAV",
             True,
-            base.position,
+            base,
             relay.antennas,
             base.antennas,
             base.power,
@@ -349,7 +355,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
         uav_user=link(
             "UAV to ground user",
             False,
-            user.position,
+            user,
             user.antennas,
             relay.antennas,
             relay.power,

@@ -63,18 +63,21 @@ def spread_known(problem: Problem) -> bool:
 def shadows(problem: Problem, w: Real, count: int = SHADOWINGS) -> Iterator[Real]:
     """Yield shadowings of both hops at positions w (n, 2), dB, (2, n) each; by the plan's seed.
 
-    A wave number with the spectrum of exp(-r / D) is a Gaussian over the size of another.
+    Of a station that moves the field is over its places too. A wave number with the spectrum of
+    exp(-r / D) is a Gaussian over the size of another.
     """
     laws = problem.plan.radio.gain_laws
     spread = np.array([[law.spread_db or 0.0] for law in laws]) * np.sqrt(2 / _WAVES)
     rng = np.random.default_rng([problem.plan.radio.seed, 2])
+    stations = [link.gains.station for link in problem.links]
+    places = [np.hstack([w, p]) if p.ndim > 1 else w for p in stations]
     for _ in range(count):
         found = np.empty((2, len(w)))
         for hop, law in enumerate(laws):
             size = np.abs(rng.standard_normal((_WAVES, 1))) * law.correlation_m
-            waves = rng.standard_normal((_WAVES, 2)) / size
+            waves = rng.standard_normal((_WAVES, places[hop].shape[1])) / size
             phases = rng.uniform(0, 2 * np.pi, (_WAVES, 1))
-            found[hop] = np.cos(waves @ w.T + phases).sum(axis=0)
+            found[hop] = np.cos(waves @ places[hop].T + phases).sum(axis=0)
         yield spread * found
 
 

@@ -36,6 +36,7 @@ def problems(plan: PlanContents) -> Iterator[str]:
     yield from _gain(plan)
     yield from _rates(plan)
     yield from _steps(plan.flight)
+    yield from _stations(plan)
     yield from _distance(plan)
     yield from _goal(plan)
     yield from _power(plan)
@@ -178,6 +179,30 @@ def _steps(flight: Flight) -> Iterator[str]:
         yield f"{given}not a whole number of steps {step}{low:.10g} or {high:.10g} would be"
     if flight.slots < FEWEST_SLOTS:
         yield f"{given}{flight.slots} step(s) {step}give at least {FEWEST_SLOTS} steps"
+
+
+def _stations(plan: PlanContents) -> Iterator[str]:
+    """Yield why a station cannot move as it is asked to."""
+    lasts = plan.flight.duration
+    stations = {"base_station": plan.radio.base_station, "ground_user": plan.radio.ground_user}
+    for name, station in stations.items():
+        given, key = quote(list(station.velocity)), f"radio.{name}."
+        away = float(np.abs(station.at(np.array([lasts]))).max())
+        if station.track is not None and any(station.velocity):
+            yield f"{key}velocity: {given}: track is given too; leave one out"
+        if station.track is not None and station.track.times[-1] < lasts:
+            yield (
+                f"{key}track: ends {station.track.times[-1]:.10g} s after it begins, and "
+                f"flight.duration is {lasts:.10g} s; give a longer track or a shorter flight"
+            )
+        if away > MAX_LOCAL_DISTANCE:
+            yield (
+                f"{key}velocity: {given}: takes it to {away / 1000:,.0f} km from the origin in "
+                f"{lasts:g} s (flight.duration); at most {MAX_LOCAL_DISTANCE / 1000:.0f} km"
+            )
+        if station.moves and plan.optimizer.method == "algorithm1":
+            what = "velocity" if station.track is None else "track"
+            yield f"{key}{what}: algorithm1 (optimizer.method) knows none; give method direct"
 
 
 def _distance(plan: PlanContents) -> Iterator[str]:

@@ -151,7 +151,7 @@ def _to_float(value: float) -> float:
         return math.inf
 
 
-def _finite_pair(value: object, unit: str) -> Vector:
+def read_pair(value: object, unit: str) -> Vector:
     """Check `[east, north]`."""
     if not (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))):
         raise ValueError(f"not two numbers [east, north] in {unit}")
@@ -172,11 +172,12 @@ def check_degrees(latitude: float, longitude: float) -> None:
         raise ValueError(f"longitude {longitude} is outside -180..180 degrees")
 
 
-def _position(value: object, info: ValidationInfo) -> Vector:
+def read_position(value: object, info: ValidationInfo) -> Vector:
+    """Return the local metres of a position as a plan writes it; raise ValueError for others."""
     if isinstance(value, dict):
         context: Any = info.context
         return _local(value, context.get("origin"))
-    east, north = _finite_pair(value, "metres")
+    east, north = read_pair(value, "metres")
     if max(abs(east), abs(north)) > MAX_LOCAL_DISTANCE:
         raise ValueError(f"farther than {MAX_LOCAL_DISTANCE / 1000:.0f} km from the origin")
     return east, north
@@ -222,7 +223,7 @@ def _velocity(value: object) -> Vector | None:
         return (0.0, 0.0) if value == "hover" else None
     if isinstance(value, str):
         raise ValueError("not hover, free or a velocity")
-    return _finite_pair(value, "m/s")
+    return read_pair(value, "m/s")
 
 
 def _velocity_word(velocity: Vector | None) -> object:
@@ -231,9 +232,9 @@ def _velocity_word(velocity: Vector | None) -> object:
     return velocity if any(velocity) else "hover"
 
 
-_PLACE = "[east, north] in metres or {latitude: degrees, longitude: degrees}"
+PLACE = "[east, north] in metres or {latitude: degrees, longitude: degrees}"
 
-Position: TypeAlias = Annotated[Vector, PlainValidator(_position), Written(_PLACE)]
+Position: TypeAlias = Annotated[Vector, PlainValidator(read_position), Written(PLACE)]
 Velocity: TypeAlias = Annotated[
     Vector | None,
     PlainValidator(_velocity),

@@ -11,7 +11,6 @@ from faao_mav.plan.fields import (
     Gain,
     Noise,
     Number,
-    Position,
     Power,
     Text,
     Whole,
@@ -20,6 +19,7 @@ from faao_mav.plan.fields import (
     section,
     watts,
 )
+from faao_mav.plan.station import Station
 from faao_mav.radio.gain import PathGain
 from faao_mav.radio.rate_steps import RateSteps
 
@@ -94,10 +94,9 @@ _GAIN_FILE = "a mapping with reference_gain_db, exponent, elevation_db, or the n
 
 
 @section
-class BaseStation:
-    """The base station."""
+class BaseStation(Station):
+    """The base station, at p_B."""
 
-    position: Position = key("Place p_B.", "m")
     antennas: Antennas = key("Antennas N_t.", default=2)
     power: Power = key("Transmit power W_B.", "dBm", name="power_dbm", default=_POWER)
     gain: GainLaw | None = key(
@@ -120,10 +119,9 @@ class Relay:
 
 
 @section
-class GroundUser:
-    """The ground user."""
+class GroundUser(Station):
+    """The ground user, at p_U."""
 
-    position: Position = key("Place p_U.", "m")
     antennas: Antennas = key("Antennas N_r.", default=2)
     noise: Noise = key("Noise power sigma_G^2.", "dBm", name="noise_dbm", default=_NOISE)
     gain: GainLaw | None = key(

@@ -15,6 +15,7 @@ from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
 from ruamel.yaml.nodes import MappingNode, Node
+from ruamel.yaml.representer import SafeRepresenter
 from ruamel.yaml.resolver import VersionedResolver
 
 from faao_mav.errors import PlanError, shortened
@@ -99,8 +100,24 @@ class _UniqueKeys(SafeConstructor):
         return True
 
 
+_LINES = re.compile(r"([!-~][ -~]*\n){2,}")
+"""Text of several lines that stands in a block as it is."""
+
+
+class _Blocks(SafeRepresenter):
+    """Writes text of several lines, as a track, line by line."""
+
+    def represent_str(self, data: str) -> Any:
+        style = "|" if _LINES.fullmatch(data) else None
+        return self.represent_scalar("tag:yaml.org,2002:str", data, style=style)
+
+
+_Blocks.add_representer(str, _Blocks.represent_str)
+
+
 def _yaml() -> Any:
     yaml: Any = YAML(typ="safe", pure=True)
+    yaml.Representer = _Blocks
     yaml.Resolver, yaml.Composer, yaml.Constructor = _CoreResolver, _PlainComposer, _UniqueKeys
     return yaml
 

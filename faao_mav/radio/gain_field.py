@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
 from faao_mav.radio.gain import PER_DB, GainFunction
 from faao_mav.radio.gain_map import Grid
 
@@ -45,6 +45,16 @@ class GainField:
     height: float
     above: Surface | None = None
 
+    @property
+    def midway(self) -> Real:
+        """Where the station is at half the time of the flight (2,), m."""
+        p, n = self.station, len(self.station)
+        return p if p.ndim == 1 else (p[(n - 1) // 2] + p[n // 2]) / 2
+
+    def in_slots(self, chosen: Integers | int) -> "GainField":
+        """Return the field with the places of the station in the slots `chosen` (k,) or ()."""
+        return self if self.station.ndim == 1 else replace(self, station=self.station[chosen])
+
     def away(self, w: Real) -> Real:
         """Return w - p (2, ..., n) at positions w (2, ..., n), m."""
         return w - self.station.T.reshape(2, *[1] * (w.ndim - 2), -1)
@@ -72,10 +82,6 @@ class GainField:
             gradient = gradient + PER_DB * np.stack([x, y])
             hessian = hessian + PER_DB * np.stack([xx, xy, yy])
         return gradient, hessian
-
-    def in_slot(self, slot: int) -> "GainField":
-        """Return the gain with the station where it is in a `slot`."""
-        return replace(self, station=self.station[slot]) if self.station.ndim > 1 else self
 
     def extremes(self, farthest: float) -> tuple[float, float]:
         """Return what l is not below and not above up to `farthest` m from the station."""

@@ -137,7 +137,7 @@ def kml_fence(content: bytes) -> Fence:
     of the folders around it, say which kind.
     """
     zipped = content.startswith(b"PK\x03\x04")
-    return fence_of(_of_kml(_tree(_unzipped(content) if zipped else content), ()))
+    return fence_of(_of_kml(xml_tree(_unzipped(content) if zipped else content), ()))
 
 
 def _of_kml(element: Xml.Element, around: tuple[str, ...]) -> Iterator[DrawnZone]:
@@ -178,15 +178,16 @@ def _unzipped(content: bytes) -> bytes:
     return kml
 
 
-def _tree(content: bytes) -> Xml.Element:
-    """Return the elements of KML, without prefixes, which need not be declared.
+def xml_tree(content: bytes) -> Xml.Element:
+    """Return the elements of KML or GPX, without prefixes, which need not be declared.
 
-    KML has no document type: one is refused, for its entities may grow without end.
+    They have no document type: one is refused, for its entities may grow without end. Raises
+    `MissionFileError`.
     """
     builder, parser = Xml.TreeBuilder(), expat.ParserCreate()
 
     def refuse(*_: object) -> None:
-        raise MissionFileError("a document type or entities; expected plain KML")
+        raise MissionFileError("a document type or entities; expected plain XML")
 
     parser.buffer_text = True
     parser.StartElementHandler = lambda tag, told: builder.start(tag.rpartition(":")[2], told)

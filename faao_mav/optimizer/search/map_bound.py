@@ -51,7 +51,7 @@ def at_ends(problem: Problem, rates: BestRates, price: float) -> float:
     kin, links = problem.kinematics, problem.links
     (U_0, U_1), (G_0, G_1) = (
         [
-            float(rates.at(j, slot, link.gains.in_slot(slot).log(end[:, None]))[0])
+            float(rates.at(j, slot, link.gains.in_slots(slot).log(end[:, None]))[0])
             for slot, end in ((0, kin.start), (-1, kin.end))
         ]
         for j, link in enumerate(links)
@@ -122,7 +122,7 @@ class MapBound:
             off = CORNER * cells.side + gap * abs(tau) + kin.max_acceleration * tau**2 / 2
             places = cells.x[:, None] + tau * velocities.T[:, :, None, None]
             for j, link in enumerate(self.problem.links):
-                gain = most_gain(link.gains.in_slot(slot), places, off)
+                gain = most_gain(link.gains.in_slots(slot), places, off)
                 found[j, number % parts] += self.rates.at(j, slot, gain)
         return found
 

@@ -1,0 +1,188 @@
+"""Where a station is: at a place, on a line at a velocity, or on a track with times."""
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from typing import Annotated, NamedTuple, TypeAlias
+
+import numpy as np
+from pydantic import PlainValidator, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from faao_mav.arrays import Real
+from faao_mav.errors import MissionFileError, PlanError, quote
+from faao_mav.plan.columns import read_columns
+from faao_mav.plan.fields import PLACE, Written, key, read_pair, read_position, section, told
+from faao_mav.vector import Vector
+
+MAX_POINTS = 5_000
+"""Points of the longest track; chosen: 80 minutes of one a second."""
+
+_FASTEST = 1000.0
+"""Greatest speed of a station, m/s; chosen, as for aircraft."""
+
+_LOCAL, _GLOBAL = ("time_s", "east_m", "north_m"), ("time_s", "latitude", "longitude")
+"""The columns of a track."""
+
+_SAME = 1.0
+"""Metres that `position` may be from the first place of `track`. Chosen."""
+
+
+class Track(NamedTuple):
+    """A way with times: at `times`, s after the first, at `places` [east, north], m.
+
+    It is straight and even between two of them.
+    """
+
+    times: tuple[float, ...]
+    places: tuple[Vector, ...]
+
+
+def read_track(text: str, path: str) -> str:
+    """Return the track in the `text` of the file `path`, .csv or .gpx, as the plan has it.
+
+    That is a table with `time_s`, s after the first point, and its place in two more columns.
+    Raises `PlanError` that names line or point for what is no track.
+    """
+    try:
+        if path.lower().endswith(".gpx"):
+            names, points = [*_GLOBAL], _gpx_points(text)
+        else:
+            lines, held = read_columns(text, (_LOCAL, _GLOBAL))
+            _check_times(lines, held["time_s"])
+            names, points = [*held], list(zip(*held.values(), strict=True))
+    except PlanError as error:
+        raise PlanError(f"{path}: {error}") from None
+    first = points[0][0]
+    rows = (f"{t - first:.11g},{x:.11g},{y:.11g}" for t, x, y in points)
+    return "\n".join([",".join(names), *rows, ""])
+
+
+def _gpx_points(text: str) -> list[tuple[float, float, float]]:
+    """Return seconds, latitude and longitude of the points of all tracks in GPX.
+
+    Source: GPX 1.1, trkpt and its time, ISO 8601.
+    """
+    from faao_mav.mission.formats.fence_file import xml_tree  # plans rarely have one
+
+    try:
+        found = list(xml_tree(text.encode()).iter("trkpt"))
+    except MissionFileError as error:
+        raise PlanError(str(error)) from None
+    points = []
+    for number, point in enumerate(found, 1):
+        when, lat, lon = point.findtext("time") or "", point.get("lat", ""), point.get("lon", "")
+        try:
+            moment = datetime.fromisoformat(when.strip())
+            moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+            points.append((moment.timestamp(), float(lat), float(lon)))
+        except (ValueError, OverflowError):
+            raise PlanError(
+                f"point {number}: lat {quote(lat)}, lon {quote(lon)}, time {quote(when)}; give "
+                "degrees, and a time as 2026-05-01T12:00:00Z"
+            ) from None
+    _check_times(range(1, len(points) + 1), [t for t, _, _ in points], "point")
+    return points
+
+
+def _check_times(numbers: Sequence[int], times: list[float], each: str = "line") -> None:
+    """Raise `PlanError` unless there are two times or more, not too many, which rise."""
+    if not 2 <= len(times) <= MAX_POINTS:
+        raise PlanError(f"{len(times):,} points with a time; give 2 to {MAX_POINTS:,}")
+    before = -math.inf
+    for number, t in zip(numbers, times, strict=True):
+        if not (math.isfinite(t) and t > before):
+            raise PlanError(f"{each} {number}: time {t:g} s; give finite times that rise")
+        before = t
+
+
+def _track(value: object, info: ValidationInfo) -> Track | None:
+    if value is None:
+        return None
+    if not isinstance(value, str):
+        raise ValueError("no file")
+    try:
+        lines, held = read_columns(value, (_LOCAL, _GLOBAL))
+        _check_times(lines, held["time_s"])
+    except PlanError as error:
+        raise told(str(error)) from None
+    times, *sides = held.values()
+    places = []
+    for line, *place in zip(lines, *sides, strict=True):
+        written = dict(zip(_GLOBAL[1:], place, strict=True)) if "latitude" in held else place
+        try:
+            places.append(read_position(written, info))
+        except (ValueError, PydanticCustomError) as error:
+            raise told(f"line {line}: {error}") from None
+    return Track(tuple(t - times[0] for t in times), tuple(places))
+
+
+def _place(value: object, info: ValidationInfo) -> Vector:
+    """Return the place at the start: that of the track where none is given."""
+    if "track" not in info.data:  # it is refused itself
+        return 0.0, 0.0
+    track: Track | None = info.data["track"]
+    if value is None:
+        if track is None:
+            raise PydanticCustomError("missing", "missing")
+        return track.places[0]
+    place = read_position(value, info)
+    if track is not None and (away := math.dist(place, track.places[0])) > _SAME:
+        raise told(f"{away:.4g} m from the first place of track; leave position out")
+    return place
+
+
+_Place: TypeAlias = Annotated[Vector, PlainValidator(_place), Written(PLACE)]
+
+
+def _velocity(value: object) -> Vector:
+    velocity = read_pair(value, "m/s")
+    if math.hypot(*velocity) > _FASTEST:
+        raise ValueError("faster than any vehicle")
+    return velocity
+
+
+_Velocity: TypeAlias = Annotated[
+    Vector, PlainValidator(_velocity), Written(f"[east, north] in m/s, at most {_FASTEST:g} m/s")
+]
+
+
+@section
+class Station:
+    """A station, which stands or moves.
+
+    >>> import numpy as np
+    >>> Station(position=(0.0, 50.0), velocity=(5.0, 0.0)).at(np.array([0.0, 10.0])).tolist()
+    [[0.0, 50.0], [50.0, 50.0]]
+    """
+
+    track: Annotated[Track | None, PlainValidator(_track)] = key(
+        "Way with times, the first of which is the plan's start; null: none.",
+        accepted="the name of a .csv with time_s and east_m, north_m or latitude, longitude, or of "
+        "a .gpx with times",
+        default=None,
+    )
+    position: _Place = key(
+        "Place at the plan's start, which has to be given without track.",
+        "m",
+        default=None,
+        validate_default=True,
+    )
+    velocity: _Velocity = key("Velocity over ground.", "m/s", default=(0.0, 0.0))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it does not stay where it is at the start."""
+        return self.track is not None or any(self.velocity)
+
+    def at(self, t: Real) -> Real:
+        """Return its places (n, 2), m, at `t` (n,), s on the plan's clock.
+
+        Beyond the ends of a track it is at its ends.
+        """
+        if self.track is None:
+            return np.asarray(np.array(self.position) + np.outer(t, self.velocity))
+        return np.stack(
+            [np.interp(t, self.track.times, side) for side in zip(*self.track.places, strict=True)],
+            axis=1,
+        )

@@ -1,0 +1,162 @@
+"""Stations that move: what a plan says of them, and what comes of it."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import SMALL, edited
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faao_mav.errors import PlanError
+from faao_mav.plan import Plan, parse_plan, read_plan
+from faao_mav.plan.station import MAX_POINTS
+
+BASE, USER = "radio.base_station", "radio.ground_user"
+HEAD = "time_s,east_m,north_m\n"
+WAY = HEAD + "".join(f"{t},{5 * t},{60 - t}\n" for t in range(0, 12, 2))
+
+NUMBERS = st.floats(-9e4, 9e4).map(lambda x: round(x, 3))
+
+
+@st.composite
+def tracks(draw: st.DrawFn) -> list[tuple[float, float, float]]:
+    """Return times, which rise from anywhere for the 10 s of the small plan or more, and places."""
+    steps = draw(st.lists(st.floats(0.01, 50), min_size=1, max_size=20))
+    times = draw(NUMBERS) + np.cumsum([0.0, *steps, 10.0])
+    return [(float(t), draw(NUMBERS), draw(NUMBERS)) for t in times]
+
+
+def moving(track: str, **changes: Any) -> Plan:
+    """Return the small plan whose user has the track of a text."""
+    return parse_plan(edited(SMALL, {f"{USER}.track": track, f"{USER}.position": None, **changes}))
+
+
+def refused(track: str, **changes: Any) -> str:
+    with pytest.raises(PlanError) as raised:
+        moving(track, **changes)
+    return str(raised.value)
+
+
+@given(tracks())
+def test_a_track_is_straight_between_its_points_and_its_first_is_the_start(
+    points: list[tuple[float, float, float]],
+) -> None:
+    plan = moving(HEAD + "".join(f"{t!r},{x!r},{y!r}\n" for t, x, y in points))
+    t, x, y = np.array(points).T
+    station, since = plan.radio.ground_user, t - t[0]
+    np.testing.assert_allclose(station.position, (x[0], y[0]))
+    np.testing.assert_allclose(station.at(since), np.stack([x, y], axis=1), atol=1e-6)
+    between = station.at((since[1:] + since[:-1]) / 2)
+    np.testing.assert_allclose(between, (station.at(since[1:]) + station.at(since[:-1])) / 2)
+    held = station.at(np.array([-1.0, since[-1] + 1e6]))
+    np.testing.assert_allclose(held, [[x[0], y[0]], [x[-1], y[-1]]])
+    assert parse_plan(plan.text).radio == plan.radio
+
+
+@given(st.tuples(NUMBERS, NUMBERS), st.tuples(st.floats(-99, 99), st.floats(-99, 99)))
+def test_a_velocity_is_a_line(place: tuple[float, float], velocity: tuple[float, float]) -> None:
+    changes = {f"{BASE}.position": [*place], f"{BASE}.velocity": [*velocity]}
+    station = parse_plan(edited(SMALL, changes)).radio.base_station
+    t = np.array([0.0, 2.5, 9.5])
+    np.testing.assert_allclose(station.at(t), place + t[:, None] * velocity, atol=1e-9)
+    assert station.moves is any(velocity)
+
+
+@given(st.text(st.sampled_from('0123456789.,-+einfatusm_\n #ortlhgd"'), max_size=200))
+def test_any_text_is_a_track_or_told_in_a_line(text: str) -> None:
+    try:
+        moving(f"{HEAD}{text}\n")
+    except PlanError as error:
+        assert len(str(error).splitlines()) == 1
+        assert str(error).startswith(f"plan: {USER}.track")
+
+
+@pytest.mark.parametrize(
+    ("track", "told"),
+    [
+        (HEAD, "0 points with a time; give 2 to"),
+        (f"{HEAD}0,1,2\n", "1 points with a time"),
+        (f"{HEAD}0,1,2\n20,1,2\n20,3,4\n", "line 4: time 20 s; give finite times that rise"),
+        (f"{HEAD}0,1,2\nnan,1,2\n", "line 3: time nan s"),
+        (f"{HEAD}0,1,2\ninf,1,2\n", "line 3: time inf s"),
+        (f"{HEAD}0,1,2\n20,nan,2\n", "line 3: nan is not a finite number of metres"),
+        (f"{HEAD}0,1,2\n20,1,2e5\n", "line 3: farther than 100 km"),
+        (f"{HEAD}0,1,2\n20,1\n", "line 3: north_m: '' is no number"),
+        ("time_s,latitude,longitude\n0,-35.36,149.16\n20,149.16,-35.36\n", "line 3: latitude 149"),
+        ("time_s,latitude,longitude\n0,-35.36,149.16\n20,35.36,149.16\n", "line 3: latitude 35"),
+        ("time,lat,lon\n0,1,2\n", "line 1: columns 'time, lat, lon'; give a header with time_s, "),
+        (HEAD + "".join(f"{t},0,0\n" for t in range(MAX_POINTS + 1)), "5,001 points with a time"),
+        (f"{HEAD}7,0,0\n16,9,0\n", "ends 9 s after it begins, and flight.duration is 10 s"),
+        ("convoy.txt", "convoy.txt: cannot be read"),
+    ],
+)
+def test_what_is_wrong_with_a_track_is_told(track: str, told: str) -> None:
+    message = refused(track)
+    assert message.startswith(f"plan: {USER}.track: ")
+    assert told in message
+    assert len(message.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({f"{USER}.position": [3, 60]}, "position: 3 m from the first place of track; leave"),
+        ({f"{USER}.velocity": [1, 0]}, "velocity: [1.0, 0.0]: track is given too; leave one out"),
+        ({f"{USER}.track": 3}, "track: 3: no file; give the name of a .csv with time_s and"),
+        ({f"{USER}.track": None}, "position: missing; give [east, north]"),
+        ({f"{BASE}.velocity": [999, 0], "flight.duration": 110}, "takes it to 110 km from the"),
+        ({f"{BASE}.velocity": [800, 800]}, "faster than any vehicle; give [east, north] in m/s"),
+        ({f"{BASE}.velocity": "fast"}, "velocity: 'fast': not two numbers"),
+        ({f"{BASE}.velocity": [math.nan, 0]}, "nan is not a finite number of m/s"),
+        ({"optimizer.method": "algorithm1"}, "algorithm1 (optimizer.method) knows none"),
+    ],
+)
+def test_what_does_not_go_with_a_station_that_moves_is_told(
+    changes: dict[str, Any], told: str
+) -> None:
+    long = WAY.replace("10,50,50", "1000,50,50")
+    assert told in refused(long, **changes)
+
+
+def test_a_file_of_a_track_is_in_the_text_of_the_plan(tmp_path: Path) -> None:
+    rows = "".join(f"a, {row}\n" for row in WAY.splitlines()[1:])
+    (tmp_path / "convoy.csv").write_text(f"# a convoy\nname, TIME_S, east_m, north_m\n{rows}")
+    points = "".join(
+        f'<trkpt lat="{-35.363262 + t * 1e-5}" lon="149.165237"><time>2026-05-01T12:00:{t:02}Z'
+        "</time></trkpt>"
+        for t in range(11)
+    )
+    (tmp_path / "ship.GPX").write_text(
+        f'<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1"><trk><trkseg>{points}'
+        "</trkseg></trk></gpx>"
+    )
+    changes: dict[str, str | None] = {f"{USER}.track": "convoy.csv", f"{BASE}.track": "ship.GPX"}
+    changes |= {f"{USER}.position": None, f"{BASE}.position": None}
+    (tmp_path / "plan.yaml").write_text(edited(SMALL, changes))
+    plan = read_plan(tmp_path / "plan.yaml")
+    assert plan.radio.ground_user == moving(WAY).radio.ground_user
+    north = plan.radio.base_station.at(np.array([0.0, 10.0]))[:, 1]
+    np.testing.assert_allclose(north, [0, 11.1], atol=0.05)
+    for each in (tmp_path / "convoy.csv", tmp_path / "ship.GPX"):
+        each.unlink()
+    assert parse_plan(plan.text).radio == plan.radio
+    assert plan.changed({"flight.duration": 9}).radio == plan.radio
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "ship.gpx: not XML"),
+        ("<gpx/>", "ship.gpx: 0 points with a time"),
+        ("<!DOCTYPE x><gpx/>", "ship.gpx: a document type or entities"),
+        ('<gpx><trkpt lat="1" lon="2"/></gpx>', "point 1: lat '1', lon '2', time ''; give degrees"),
+    ],
+)
+def test_what_is_wrong_with_gpx_is_told(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "ship.gpx").write_text(text)
+    message = refused(str(tmp_path / "ship.gpx"))
+    assert told in message
+    assert len(message.splitlines()) == 1
