@@ -23,6 +23,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.zones import PolygonZone
 from faao_mav.report import write_part
+from faao_mav.report.style import SPEEDS
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result, plan_mission
 
@@ -49,7 +50,8 @@ class Answer:
 
     `refused` is the error of a plan that cannot be used, `failed` that of one without a flight.
     `delivered` is in bit/s/Hz, `megabytes` None without a bandwidth. `drawing` has the lines of
-    the map in [latitude, longitude], and times, s, and speeds, m/s, at its places; `charts` are
+    the map in [latitude, longitude], and times, s, and speeds, m/s, at its places, with
+    the colours of speeds from 0 to `top`; `charts` are
     options of ECharts. `result` is there in the finished answer only.
     """
 
@@ -106,6 +108,7 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         "times": thinned(flight.t).round(3).tolist(),
         "speeds": thinned(speeds).round(3).tolist(),
         "top": max(float(speeds.max()), 0.01),
+        "shades": SPEEDS,
         "track": [],
         "waypoints": [],
         "margin": [],

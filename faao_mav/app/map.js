@@ -3,7 +3,6 @@
 import { leaflet as L } from "nicegui-leaflet";
 import { loadResource } from "../../static/utils/resources.js";
 
-const VIRIDIS = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [200, 220, 50]];
 const SHADES = 20; // colours of the route
 const PERIOD = 50; // milliseconds between two reports of one drag
 const LINES = {
@@ -15,10 +14,11 @@ const LINES = {
 };
 const NUDGE = 10, FINE = 1; // pixels by which an arrow key moves a marker, and with Shift
 
-function colour(share) {
-  const x = Math.min(0.999, Math.max(0, share)) * (VIRIDIS.length - 1), k = Math.floor(x);
-  const mixed = VIRIDIS[k].map((c, i) => Math.round(c + (x - k) * (VIRIDIS[k + 1][i] - c)));
-  return `rgb(${mixed.join(",")})`;
+// The colour at a share of the way along `shades`, #rrggbb each.
+function colour(shades, share) {
+  const x = Math.min(0.999, Math.max(0, share)) * (shades.length - 1), k = Math.floor(x);
+  const [from, to] = [shades[k], shades[k + 1]].map((each) => each.match(/\w\w/g).map((hex) => parseInt(hex, 16)));
+  return `rgb(${from.map((c, i) => Math.round(c + (x - k) * (to[i] - c))).join(",")})`;
 }
 
 const zone_class = (inclusion) => (inclusion ? "zone-in" : "zone-out");
@@ -183,9 +183,9 @@ export default {
     },
     // The flight: planned route coloured by speed, predicted track, waypoints, the fence's margin and
     // the zones of its file.
-    flight({ places, speeds, top, track, waypoints, margin, zones }) {
+    flight({ places, speeds, top, shades, track, waypoints, margin, zones }) {
       this.route.clearLayers();
-      this.top = top;
+      Object.assign(this, { top, shades });
       const line = (points, className, more = {}) =>
         L.polyline(points, { className, interactive: false, ...more }).addTo(this.route);
       for (const ring of margin) line(ring, "margin");
@@ -193,7 +193,7 @@ export default {
       const shade = (k) => Math.round((SHADES * (speeds[k] + speeds[k + 1])) / (2 * top));
       for (let k = 0, from = 0; k + 1 < places.length; k++) {
         if (k + 2 < places.length && shade(k + 1) === shade(k)) continue;
-        line(places.slice(from, k + 2), "route", { color: colour(shade(k) / SHADES), weight: 5 });
+        line(places.slice(from, k + 2), "route", { color: colour(shades, shade(k) / SHADES), weight: 5 });
         from = k + 1;
       }
       if (track.length) line(track, "track");
@@ -216,8 +216,7 @@ export default {
     },
     // What the lines on the map are: the speeds of the route, and each kind of line that is there.
     show_key() {
-      const shades = VIRIDIS.map((_, k) => colour(k / (VIRIDIS.length - 1)));
-      const speeds = `0<b style="background: linear-gradient(to right, ${shades})"></b>${Number(this.top).toFixed(1)} m/s`;
+      const speeds = `0<b style="background: linear-gradient(to right, ${this.shades})"></b>${Number(this.top).toFixed(1)} m/s`;
       const there = (name) => (name === "flown" ? this.track.getLatLngs().length : this.$el.querySelector(`.leaflet-pane path.${name}`));
       const lines = Object.entries(LINES).filter(([name]) => there(name));
       const row = ([name, text]) => `<svg><path class="${name}" d="M0 4H22"/></svg>${text}`;

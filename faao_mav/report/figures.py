@@ -28,12 +28,11 @@ _COLOURS = {"planned": SERIES[0], "predicted": SERIES[1], "flown": SERIES[2]}
 
 
 class _Plot(NamedTuple):
-    """A plot over time, s: its title, what it shows with the unit, and by their names curves.
+    """A plot over time, s: what it shows with the unit, and by their names curves.
 
     A curve is its times and values; `limits` are values that the curves are to keep.
     """
 
-    title: str
     what: str
     curves: Mapping[str, tuple[Real, Real]]
     limits: Mapping[str, float] = MappingProxyType({})
@@ -50,7 +49,7 @@ def flight_figure(
         column += [figure.add_subplot(grid[k, 1], sharex=column[0]) for k in (1, 2)]
         column[2].sharey(column[1])
         _draw(column, _speed(solution, conversion), *_hops(solution, prediction))
-        route_map(solution, conversion, plot, "Route")
+        route_map(solution, conversion, plot)
     return figure
 
 
@@ -64,7 +63,7 @@ def route_figure(
     'east, m'
     """
     with drawing(WIDTH, 4.2) as figure:
-        route_map(solution, conversion, figure.subplots(), flown=flown)
+        route_map(solution, conversion, figure.subplots(), flown)
     return figure
 
 
@@ -72,7 +71,7 @@ def apart(solution: Solution, prediction: Prediction, flown: Prediction) -> "Fig
     """Return how far the flight is from the plan at equal times: predicted, and as flown."""
     flights = {"predicted": prediction, "flown": flown}
     off = {name: (solution.t, lengths(each.w - solution.w)) for name, each in flights.items()}
-    return _figure(_Plot("", "distance from the plan, m", off))
+    return _figure(_Plot("distance from the plan, m", off))
 
 
 def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure":
@@ -86,7 +85,7 @@ def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure"
     limit = {"a_max": plan.vehicle.max_acceleration}
     return _figure(
         _speed(solution, conversion),
-        _Plot("Acceleration", "acceleration, m/s²", {"planned": needed}, limit),
+        _Plot("acceleration, m/s²", {"planned": needed}, limit),
     )
 
 
@@ -110,7 +109,7 @@ def queue(
         name: (solution.t, held * flight.relayed.queue)
         for name, flight in _flights(solution, prediction, flown).items()
     }
-    return _figure(_Plot("", f"waiting, {unit}", curves, {"buffer": buffer} if buffer else {}))
+    return _figure(_Plot(f"waiting, {unit}", curves, {"buffer": buffer} if buffer else {}))
 
 
 def arrival(solution: Solution, under: Shadowed) -> "Figure":
@@ -140,12 +139,12 @@ def precoder_power(solution: Solution) -> "Figure":
 
     radio, plots = solution.plan.radio, []
     for station, P, limit, power in (
-        ("Base station", solution.P_B, "W_B", radio.base_station.power),
+        ("base station", solution.P_B, "W_B", radio.base_station.power),
         ("UAV", solution.P_U, "W_U", radio.relay.power),
     ):
         streams = enumerate(_stream_powers(P).T, 1)
         curves = {f"stream {k}": (solution.t, stream) for k, stream in streams}
-        plots.append(_Plot(station, "power, W", curves, {limit: power}))
+        plots.append(_Plot(f"{station}, W", curves, {limit: power}))
     figure = _figure(*plots)
     for axes in figure.axes:
         axes.yaxis.set_major_formatter(EngFormatter("W"))
@@ -169,19 +168,19 @@ def convergence(solution: Solution) -> "Figure":
 def mission_motion(track: Track) -> "Figure":
     """Return ground speed, m/s, and height above home, m, over time, s."""
     return _figure(
-        _Plot("", "ground speed, m/s", {"": (track.t, lengths(track.velocity[:, :2]))}),
-        _Plot("", "height above home, m", {"": (track.t, track.position[:, 2])}),
+        _Plot("ground speed, m/s", {"": (track.t, lengths(track.velocity[:, :2]))}),
+        _Plot("height above home, m", {"": (track.t, track.position[:, 2])}),
     )
 
 
 def energy(use: EnergyUse) -> "Figure":
     """Return the power of the whole predicted flight, W, and what is used or left, Wh."""
-    stored = _Plot("", "used, Wh", {"": (use.t, use.used)})
+    stored = _Plot("used, Wh", {"": (use.t, use.used)})
     if use.battery is not None:
         full = use.battery.capacity_wh
         reserve = {"reserve": full - use.battery.usable}
-        stored = _Plot("", "left, Wh", {"": (use.t, full - use.used)}, reserve)
-    return _figure(_Plot("", "power, W", {"": (use.t, use.power)}), stored)
+        stored = _Plot("left, Wh", {"": (use.t, full - use.used)}, reserve)
+    return _figure(_Plot("power, W", {"": (use.t, use.power)}), stored)
 
 
 def _of_a_slot(plan: Plan) -> tuple[float, str]:
@@ -210,7 +209,7 @@ def _speed(solution: Solution, conversion: Conversion | None) -> _Plot:
     limits = {"v_max": vehicle.max_speed}
     if vehicle.min_speed > 0:
         limits["v_min"] = vehicle.min_speed
-    return _Plot("Speed", "speed, m/s", curves, limits)
+    return _Plot("speed, m/s", curves, limits)
 
 
 def _hops(
@@ -221,8 +220,8 @@ def _hops(
     to_uav = {name: (solution.t, flight.I_U) for name, flight in flights.items()}
     to_user = {name: (solution.t, flight.I_G) for name, flight in flights.items()}
     return (
-        _Plot("Base station to UAV", "rate, bit/s/Hz", to_uav),
-        _Plot("UAV to user", "rate, bit/s/Hz", to_user),
+        _Plot("rate to UAV, bit/s/Hz", to_uav),
+        _Plot("rate to user, bit/s/Hz", to_user),
     )
 
 
@@ -249,7 +248,7 @@ def _draw(column: "list[Axes]", *plots: _Plot) -> None:
                 line.set(linewidth=1.1 if k else 3.6, alpha=None if k else 0.45)
         axes.set_ylim(bottom=min(0.0, axes.dataLim.y0))
         last = axes is column[-1]
-        label(axes, plot.title, "time, s" if last else "", plot.what)
+        label(axes, "", "time, s" if last else "", plot.what)
         axes.tick_params(labelbottom=last)
         if ("" not in plot.curves or plot.limits) and len(plot.curves) <= len(SERIES):
             legend_above(axes)

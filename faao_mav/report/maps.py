@@ -19,6 +19,7 @@ from faao_mav.report.style import (
     INK,
     MUTED,
     SERIES,
+    SPEEDS,
     WIDTH,
     drawing,
     label,
@@ -40,22 +41,18 @@ _WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 
 _PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
 _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
-_SHADES = (0.85, 0.3)  # slow and fast on viridis, whose ends vanish on white and on black paper
-
-_BESIDE = 9.0  # points from a waypoint to the middle of its number; chosen: clear of a route's line
-_APART = 0.07  # least distance of two items with numbers, of how far all reach; chosen to be read
 
 
 def route_map(
     solution: Solution,
     conversion: Conversion | None,
     plot: "Axes",
-    title: str = "",
     flown: Prediction | None = None,
 ) -> None:
-    """Draw the map on `plot`: east and north in metres, speeds as colours with a bar.
+    """Draw the map on `plot`, whose figure has all else: speeds as colours with a bar.
 
-    It shows all of the flight and both stations, and of a wider fence what is near them.
+    East and north are in metres. It shows all of the flight and both stations, and of a wider fence
+    what is near them.
     """
     plan, radio = solution.plan, solution.plan.radio
     stations = [radio.base_station.position, radio.ground_user.position]
@@ -67,7 +64,7 @@ def route_map(
             name = f"margin {plan.fence.margin:g} m"
             plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
     _coloured(plot, solution)
-    seen = [solution.w, np.array(stations)]
+    seen, numbers = [solution.w, np.array(stations)], []
     if flown is not None:
         seen.append(flown.w)
         plot.plot(*flown.w.T, color=SERIES[1], linewidth=1.6, label="flown")
@@ -77,9 +74,10 @@ def route_map(
         for way in _ways(plan, conversion) if outlines else ():
             seen.append(way)
             plot.plot(*way.T, color=MUTED, linewidth=0.9, label="from and to home")
-        seen.append(_draw_items(plot, conversion.mission, frame, _WAYPOINTS, "waypoint"))
-    _show_all(plot, np.concatenate(seen), outlines, title)
-    mark_stations(plot, list(zip(("base station", "user"), stations, "s^", strict=True)))
+        numbers = _draw_items(plot, conversion.mission, frame, _WAYPOINTS, "waypoint")
+        seen += [place[np.newaxis] for _, place in numbers]
+    _show_all(plot, np.concatenate(seen), outlines)
+    mark_stations(plot, list(zip(("base station", "user"), stations, "s^", strict=True)), numbers)
 
 
 def mission_map(mission: Mission, track: Track) -> "Figure":
@@ -92,8 +90,10 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
         plot = figure.subplots()
         outlines = _draw_fence(plot, mission.fence, track.frame)
         plot.plot(*flown.T, color=SERIES[0], label="predicted")
-        places = _draw_items(plot, mission, track.frame, FLOWN_TO, "item")
-        _show_all(plot, np.concatenate([flown, places]), outlines)
+        numbers = _draw_items(plot, mission, track.frame, FLOWN_TO, "item")
+        places = [place[np.newaxis] for _, place in numbers]
+        _show_all(plot, np.concatenate([flown, *places]), outlines)
+        write_beside(plot, numbers)
     return figure
 
 
@@ -119,7 +119,7 @@ def _ways(plan: Plan, conversion: Conversion) -> Iterator[Real]:
         yield np.vstack([route[-1:], way_home(plan, route[-1]), home])
 
 
-def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real], title: str = "") -> None:
+def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real]) -> None:
     """Let `plot` show all of `seen` (k, 2), m, and outlines as far as half as wide beyond it.
 
     A metre is as long to the east as to the north.
@@ -132,22 +132,21 @@ def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real], title: str = "
     plot.set_aspect("equal", adjustable="datalim")
     plot.dataLim.set_points(np.array([low, high]))
     plot.margins(0.08)
-    label(plot, title, "east, m", "north, m")
+    label(plot, "", "east, m", "north, m")
     legend_above(plot, 2)
 
 
 def _coloured(plot: "Axes", solution: Solution) -> None:
-    """Draw the planned route, light where it is slow."""
-    from matplotlib import colormaps
+    """Draw the planned route in the colours of its speeds."""
     from matplotlib.collections import LineCollection
-    from matplotlib.colors import ListedColormap
+    from matplotlib.colors import LinearSegmentedColormap
 
     count = len(solution.w)
     ends = np.linspace(0, count - 1, min(count, _PIECES + 1)).round().astype(int)
     pieces = [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
     speeds = lengths(solution.v)
     means = np.array([speeds[piece].mean() for piece in pieces])
-    colours = ListedColormap(colormaps["viridis"](np.linspace(*_SHADES, _LEVELS)))
+    colours = LinearSegmentedColormap.from_list("speeds", SPEEDS, _LEVELS)
     route = [solution.w[piece] for piece in pieces]
     lines = LineCollection(route, cmap=colours, linewidths=5, capstyle="round")
     lines.set_array(means)
@@ -162,25 +161,13 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
 
 def _draw_items(
     plot: "Axes", mission: Mission, frame: LocalFrame, commands: Collection[int], name: str
-) -> Real:
-    """Draw the items with one of `commands`, numbered from 1; return their places (k, 2), m.
-
-    A number stands right of the way. Where one is near already, it is left out.
-    """
+) -> list[tuple[str, Real]]:
+    """Draw the items with one of `commands`; return their numbers, from 1, and places (2,), m."""
     found = [
-        (number, item.x, item.y)
+        (str(number), frame.to_local(item.x, item.y))
         for number, item in enumerate(mission.items, 1)
         if item.command in commands and (item.x or item.y)
     ]
-    numbers, latitudes, longitudes = zip(*found, strict=True) if found else ((), (), ())
-    places = frame.to_local(latitudes, longitudes)
+    places = np.reshape([place for _, place in found], (-1, 2))
     plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
-    ways = np.gradient(places, axis=0) if len(places) > 1 else np.ones_like(places)
-    least = _APART * np.ptp(places, axis=0).max() if numbers else 0.0
-    written = np.empty((0, 2))
-    for number, place, (east, north) in zip(numbers, places, ways, strict=True):
-        if not (lengths(written - place) < least).any():
-            written = np.vstack([written, place])
-            side = _BESIDE * np.array([north, -east]) / (float(np.hypot(east, north)) or 1.0)
-            write_beside(plot, str(number), place, side, fontsize=8, ha="center", va="center")
-    return places
+    return found

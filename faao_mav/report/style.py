@@ -5,6 +5,8 @@ Figures are matplotlib's, made without pyplot: there is no global state and no w
 
 import html
 import io
+import itertools
+import math
 import re
 import warnings
 from collections.abc import Iterator, Sequence
@@ -12,7 +14,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from faao_mav.arrays import Real
 from faao_mav.files import FIGURES, check_ending, write_whole
+from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,11 +29,24 @@ INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
 
 SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54606e")
 """Colours of curves in fixed order: the colour-blind tell them apart, on light and dark paper."""
+SPEEDS = ("#9bd93c", "#4ac16d", "#1fa287", "#26818e", "#355f8d")
+"""Colours of a route from standing to its top speed, on every map: viridis without its ends, which
+vanish on white and on black paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 """Markers of curves, in the order of `SERIES`."""
 
 WIDTH = 4.2
 """Inches: a page makes a figure as wide as a phone, where 9 points must still be read."""
+
+_AROUND = np.array([(x, y) for x, y in itertools.product((1, -1, 0), repeat=2) if x or y])
+"""The sides of a place on which a text may stand, from the first that is tried on."""
+
+_NEAR, _FAR, _CLEAR = 4.0, 16.0, 2.5
+"""Points from a place to its text, at most to one that is not left out, and from a text to lines
+and other texts. Chosen: beside the map's widest line, of 5 points, texts stay clear."""
+
+_STEP = 4.0
+"""Pixels between two places of a line that no text is to cover: a text is 10 high."""
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
@@ -92,8 +111,8 @@ def label(axes: "Axes", title: str, x: str, y: str) -> None:
     axes.set_ylabel(_plain(y))
 
 
-def legend_above(axes: "Axes", columns: int = 3) -> None:
-    """Put the legend over the plot, right of its title, where it hides no curve."""
+def legend_above(axes: "Axes", columns: int = 4) -> None:
+    """Put the legend over a plot that has no title, where it hides no curve."""
     handles, names = axes.get_legend_handles_labels()
     once = dict(zip(names, handles, strict=True))
     axes.legend(
@@ -115,24 +134,74 @@ def _plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def mark_stations(axes: "Axes", places: Sequence[tuple[str, tuple[float, float], str]]) -> None:
-    """Mark (name, [east, north], marker) with their names beside them."""
-    for name, (east, north), marker in places:
-        axes.plot([east], [north], marker, color=INK, markersize=7, zorder=5)
-        write_beside(axes, name, (east, north), (7, 7))
+def mark_stations(
+    axes: "Axes",
+    places: Sequence[tuple[str, tuple[float, float], str]],
+    more: Sequence[tuple[str, Any]] = (),
+) -> None:
+    """Mark (name, [east, north], marker) on a plot that is finished, with their names beside them.
+
+    Each `more` (text, [east, north]) is written too, where it covers nothing.
+    """
+    for _, (east, north), marker in places:
+        axes.plot([east], [north], marker, color=INK, markersize=7, zorder=5, scalex=False,
+                  scaley=False)  # fmt: skip
+    named = [(name, place) for name, place, _ in places]
+    write_beside(axes, [*named, *more], always=len(named))
 
 
-def write_beside(axes: "Axes", text: str, place: Any, offset: Any, **style: Any) -> None:
-    """Write `text` at an `offset`, points, from a `place` [east, north], legible over lines."""
-    axes.annotate(
-        text,
-        place,
-        xytext=offset,
-        textcoords="offset points",
-        zorder=6,
-        bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
-        **style,
-    )
+def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0) -> None:
+    """Write each (text, [east, north]) beside its place, where it covers no line and no text.
+
+    Where there is no such place a text is left out; of the first `always` none is: they stand where
+    they cover least.
+    """
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # from here on places on the paper are known
+    pixels = figure.dpi / 72
+    paper, dots = axes.get_window_extent(), _drawn(axes)
+    taken: list[Any] = []
+    for k, (text, place) in enumerate(texts):
+        shown = axes.annotate(
+            text, place, (0, 0), textcoords="offset points", ha="center", va="center", zorder=6,
+            fontsize=9 if k < always else 8,
+            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+        )  # fmt: skip
+        box = shown.get_window_extent()
+        size = np.array([box.width, box.height]) / 2
+        best: tuple[float, Any, Any] = (math.inf, None, None)
+        for away, side in itertools.product((_NEAR, _FAR) if k < always else (_NEAR,), _AROUND):
+            offset = side * (size + away * pixels)
+            there = box.translated(*offset)
+            clear = there.padded(_CLEAR * pixels)
+            covers = clear.count_contains(dots) + 1e3 * clear.count_overlaps(taken)
+            if not (paper.contains(*there.min) and paper.contains(*there.max)):
+                covers += 1e6
+            best = min(best, (covers, offset, there), key=lambda each: each[0])
+        covers, offset, there = best
+        if covers and k >= always:
+            shown.remove()
+            continue
+        shown.set_position(offset / pixels)
+        taken.append(there)
+
+
+def _drawn(axes: "Axes") -> Real:
+    """Return places (n, 2), pixels, along all lines of a plot and at its marks."""
+    from matplotlib.collections import LineCollection
+
+    marks = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
+    ways = [line.get_xydata() for line in axes.lines if line.get_linestyle() != "None"]
+    for each in axes.collections:
+        if isinstance(each, LineCollection):
+            ways += each.get_segments()
+    places = [np.empty((0, 2)), *map(axes.transData.transform, marks)]
+    for way in map(axes.transData.transform, ways):
+        along = np.cumsum([0.0, *lengths(np.diff(way, axis=0))])
+        at = np.arange(0.0, along[-1] + _STEP, _STEP)
+        places.append(np.stack([np.interp(at, along, x) for x in way.T], axis=1))
+    return np.concatenate(places)
 
 
 def render(figure: "Figure", suffix: str) -> bytes:

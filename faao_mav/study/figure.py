@@ -171,13 +171,13 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
             colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
             width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
             plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
-        as_map(plot, plan, plan.name or "routes")
         figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
+        as_map(plot, plan, plan.name or "routes")
     return figure
 
 
 def as_map(plot: "Axes", plan: Plan, title: str) -> None:
-    """Make `plot` a map with the stations and the ends of `plan`."""
+    """Make `plot`, whose figure has all else, a map with the stations and the ends of `plan`."""
     radio, flight = plan.radio, plan.flight
     places = (
         ("base station", radio.base_station.position, "s"),
@@ -185,10 +185,11 @@ def as_map(plot: "Axes", plan: Plan, title: str) -> None:
         ("start", flight.start, "o"),
         ("end", flight.end, "o"),
     )
-    mark_stations(plot, places)
+    plot.plot(*zip(*(place for _, place, _ in places), strict=True), linestyle="none")
     plot.set_aspect("equal", adjustable="datalim")
     plot.margins(0.1)
     label(plot, title, "east, m", "north, m")
+    mark_stations(plot, places)
 
 
 def _named(values: Mapping[str, Value]) -> str:
