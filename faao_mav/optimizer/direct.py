@@ -33,7 +33,7 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.search.multistart import EQUAL, ImprovedStarts, improve_starts, stretched
+from faao_mav.optimizer.search.multistart import EQUAL, improve_starts, paced
 from faao_mav.optimizer.search.starts import sparing_starts, starts
 from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
@@ -51,12 +51,6 @@ that is flown at, half of the last keeps the aircraft on it, 3 % of the distance
 _TOLLED_ITERATIONS = 40
 """Iterations of a flight under shadowing, at most. Chosen."""
 
-ROUGH = 1e-3
-"""The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared.
-
-Chosen; what a change costs is not measured.
-"""
-
 
 def direct(
     problem: Problem,
@@ -72,9 +66,9 @@ def direct(
     The result is never worse than any start. Raises `InfeasibleError` when there is no flight at
     all.
     """
-    options, kin, relay = problem.plan.optimizer, problem.kinematics, problem.maximised_queue
-    scheme = design(problem.plan, problem.precoder)
-    counts_cutoff = options.rate == "cutoff" or scheme.gaussian
+    kin, relay = problem.kinematics, problem.maximised_queue
+    scheme, own_steps = design(problem.plan, problem.precoder), problem.uav_user.steps
+    counts_cutoff = problem.plan.optimizer.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
 
     def tell(number: int, stage: str, best: float) -> None:
@@ -83,40 +77,33 @@ def direct(
 
     tell(0, "rates over the map", 0.0)
     field = rate_field(problem, scheme)
+
+    def value(flight: Trajectory) -> float:
+        """What is reported: rates of the alphabet, or the steps, not what smooths them."""
+        if scheme.gaussian or own_steps is not None:
+            return _worth(problem, flight.w, _designed(problem, scheme, flight.w))
+        return objective(field.value(flight.w.T), kin, relay)
+
     routes = _routes(problem, before, known, alone=alone)
     tell(1, "the starts", 0.0)
-    rough, strategy = ImprovedStarts(routes, list(routes)), None
-    steps = options.max_iterations * _LONG_SEARCH
+    steps = problem.plan.optimizer.max_iterations * _LONG_SEARCH
+    improved, going = dict(routes), list(routes)
     if len(routes) > 1:  # a single start needs no comparison
-        strategy = WARM_START
-        rough = improve_starts(
-            kin,
-            field,
-            routes,
-            tolerance=ROUGH,
-            max_iterations=steps,
-            relay=relay,
-            constraints=problem.constraints,
-            coarse=problem.energy == np.inf,  # the copy cannot make the circles that save energy
-        )
-    flights = [*routes.values(), *rough.flights.values()]
-    values = np.array([objective(field.value(flight.w.T), kin, relay) for flight in flights])
-    going = [rough.flights[name] for name in rough.promising]
-    if (first := int(values.argmax())) < len(routes):  # no start was improved as far
-        going.append(flights[first])
-    steps_of_rates = problem.uav_user.steps
-    told = scheme.gaussian or steps_of_rates is not None
-    if told:  # what is reported are the rates of the alphabet, or the steps themselves
-        values = np.array([_worth(problem, f.w, _designed(problem, scheme, f.w)) for f in flights])
-    tell(2, "the best start", float(values.max()))
-    optima = [_maximized(problem, field, start, steps, strategy) for start in going]
-    by_start = dict(zip(routes, values[len(routes) :].tolist(), strict=True))
-    if not told:
-        promising = zip(rough.promising, optima, strict=False)
-        by_start |= {name: optimum.value for name, optimum in promising}
+        improved, going = improve_starts(problem, field, routes, steps)
+    strategy = WARM_START if len(routes) > 1 else None
+    flights = [*routes.values(), *improved.values()]
+    values = [value(flight) for flight in flights]
+    best_yet = int(np.argmax(values))
+    tell(2, "the best start", values[best_yet])
+    starts = [improved[name] for name in going]
+    if best_yet < len(routes):  # no start was improved as far
+        starts.append(flights[best_yet])
+    optima = [_maximized(problem, field, start, steps, strategy) for start in starts]
+    by_start = dict(zip(routes, values[len(routes) :], strict=True))
+    by_start |= {name: value(end.trajectory) for name, end in zip(going, optima, strict=False)}
     best = _best(problem, field, optima)
-    if isinstance(steps_of_rates, RateSteps):
-        start = replace(best, trajectory=flights[int(values.argmax())])
+    if isinstance(own_steps, RateSteps):
+        start = replace(best, trajectory=flights[best_yet])
         best = _sharpened(problem, scheme, [*optima, start], steps)
     if spread_known(problem):
         best = _under_shadowing(problem, field, best)
@@ -125,9 +112,6 @@ def direct(
         _precoders(link, rate, scheme, flight.w)
         for link, rate in zip(field.links, field.rates, strict=True)
     ]
-    error = 0.0  # by how much values in the field are above those of the precoders themselves
-    if not told and not spread_known(problem):
-        error = best.value - _worth(problem, flight.w, precoders)
     residual = f"stationary to {best.residual:.1e}"
     solution = make_solution(
         problem,
@@ -139,13 +123,12 @@ def direct(
         ending=residual if best.converged else f"stopped after {best.iterations} steps, {residual}",
     )
     reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
-    history = np.maximum.accumulate([values[0], *values[len(routes) :]]) - error
-    if spread_known(problem):  # without it another flight may have more
-        history = np.minimum(history, reached)
+    # values by tables may be above those of the precoders, and without shadowing more is delivered
+    history = np.maximum.accumulate([values[0], *values[len(routes) :]])
     return replace(
         solution,
-        history=np.append(history, reached),
-        starts={name: value - error for name, value in by_start.items()},
+        history=np.append(np.minimum(history, reached), reached),
+        starts={name: min(each, reached) for name, each in by_start.items()},
         gain=None
         if before is None
         else reached - _worth(problem, before.w, [before.P_B, before.P_U]),
@@ -184,7 +167,7 @@ def _in_time(problem: Problem, flight: Trajectory) -> Real:
     With a least speed they are those of the nearest flight that has it, if one is found.
     """
     kin = problem.kinematics
-    slower = stretched(kin, flight)
+    slower = paced(kin, flight, kin.time_step)
     if kin.min_speed == 0:
         return slower
     then, now = (np.linspace(0, 1, n) for n in (kin.slots, len(flight.w)))
@@ -261,14 +244,9 @@ def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
     return objective(np.stack(rates), problem.kinematics, problem.maximised_queue)
 
 
-def _designed(
-    problem: Problem, scheme: Design, w: Real, near: Sequence[Complex | None] = (None, None)
-) -> list[Complex]:
-    """Return the precoders of both links at w (n, 2) by `scheme`, searched from `near` ones."""
-    return [
-        scheme.precoders(link, link.channel(w, link.small_scale(w)), start=start)
-        for link, start in zip(problem.links, near, strict=True)
-    ]
+def _designed(problem: Problem, scheme: Design, w: Real) -> list[Complex]:
+    """Return the precoders of both links at w (n, 2) by `scheme`."""
+    return [scheme.precoders(link, link.channel(w, link.small_scale(w))) for link in problem.links]
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:

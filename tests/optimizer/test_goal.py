@@ -14,7 +14,7 @@ from faao_mav.optimizer.goal import least_number
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.search.multistart import stretched
+from faao_mav.optimizer.search.multistart import paced
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.fields import dbm
 from faao_mav.report.summary import result_lines
@@ -134,7 +134,7 @@ def test_a_flight_that_takes_longer_keeps_the_limits(seed: int, more: int, free:
     short, long = (
         Kinematics(*ends, slots, 0.5, 12.0, 4.0, hover, hover, True) for slots in (40, 40 + more)
     )
-    flight = long.follow(stretched(long, random_flight(short, seed)))
+    flight = long.follow(paced(long, random_flight(short, seed), 0.5))
     speed, acceleration = (np.linalg.norm(each, axis=1).max() for each in (flight.v, flight.a))
     assert speed <= 12.0 * (1 + 1e-2)  # sampled anew, and led to the end
     assert acceleration <= 4.0 * (1 + 1e-1)

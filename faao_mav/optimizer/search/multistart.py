@@ -3,17 +3,16 @@
 Long flights are improved on a coarse copy with fewer slots, which costs a fraction of the time.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.radio.relay import RelayQueue
+from faao_mav.optimizer.problem import Problem
 
 COARSE_SLOTS = 60
 """Slots of the coarse copy: enough for the shape of a route. Chosen."""
@@ -21,9 +20,15 @@ COARSE_SLOTS = 60
 FEWEST_SLOTS = 2 * COARSE_SLOTS
 """Slots from which a coarse copy is used. Chosen; what a change costs is not measured."""
 
-_COARSE_TOLERANCE = 3e-3  # least tolerance on the copy, which differs from the flight by more
-_COARSE_ERROR = 5e-3  # share of the best value within which starts are equally good on the copy
-_SAME = 0.02  # distance of flights that count as one, in the longer of their extents in x and y
+ROUGH, _COARSE_TOLERANCE = 1e-3, 3e-3
+"""The tolerances on R_avg, bit/s/Hz, to which starts are improved before they are compared: of the
+flights themselves, and on the copy, which differs from them by more. Chosen."""
+
+_COARSE_ERROR = 5e-3
+"""The share of the best value within which starts are equally good on the copy. Chosen."""
+
+_SAME = 0.02
+"""The distance of flights that count as one, in the longer of their extents in x and y. Chosen."""
 
 EQUAL = 1e-6
 """The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
@@ -56,72 +61,48 @@ class BlockStage:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class ImprovedStarts:
-    """The flights near the local optima that the starts lead to, by the name of the start.
-
-    `promising` names those that may be improved to the best local optimum, in the order given.
-    """
-
-    flights: dict[str, Trajectory]
-    promising: list[str]
-
-
 def improve_starts(
-    kin: Kinematics,
-    stage: Stage,
-    flights: Mapping[str, Trajectory],
-    *,
-    tolerance: float,
-    max_iterations: int,
-    relay: RelayQueue | None = None,
-    constraints: Callable[[Kinematics], Sequence[Constraint]] = lambda _: (),
-    coarse: bool = True,
-) -> ImprovedStarts:
-    """Improve the feasible `flights` to `tolerance` and compare them.
+    problem: Problem, stage: Stage, flights: Mapping[str, Trajectory], max_iterations: int
+) -> tuple[dict[str, Trajectory], list[str]]:
+    """Return the feasible `flights` improved roughly by `stage`, and the names of promising ones.
 
     Not promising are flights that end clearly below the best, and those that end where an earlier
-    one does. No coarse copy is used for short flights, for those with a least speed (the copy
-    cannot make their turns), and for a single start, which needs no comparison.
-
-    The `tolerance` on a coarse copy is at least 3e-3; `relay` is the queue whose delivered rate is
-    maximised, if any; `constraints` says what flights of given kinematics keep beside their limits.
+    one does. No coarse copy is used for short flights, for those with a least speed or an energy
+    (the copy cannot make their circles).
     """
-    copy, reward, on_copy = kin, stage, list(flights.values())
-    if coarse and len(flights) > 1 and kin.slots >= FEWEST_SLOTS and kin.min_speed == 0:
-        copy, reward = coarse_copy(kin), BlockStage(stage, kin.slots, COARSE_SLOTS)
-        tolerance = max(tolerance, _COARSE_TOLERANCE)
-        on_copy = [copy.follow(resampled(kin, flight, copy)) for flight in on_copy]
-    kept = constraints(copy)
-    optima = {
-        name: maximize(
+    kin = copy = problem.kinematics
+    reward, tolerance = stage, ROUGH
+    if kin.slots >= FEWEST_SLOTS and kin.min_speed == 0 and problem.energy == np.inf:
+        copy, tolerance = coarse_copy(kin), _COARSE_TOLERANCE
+        reward = BlockStage(stage, kin.slots, COARSE_SLOTS)
+    kept, optima = problem.constraints(copy), {}
+    for name, flight in flights.items():
+        start = flight if copy is kin else copy.follow(paced(copy, flight, kin.time_step))
+        optima[name] = maximize(
             copy,
             reward,
             start,
             constraints=kept,
             tolerance=tolerance,
             max_iterations=max_iterations,
-            relay=relay,
+            relay=problem.maximised_queue,
         )
-        for name, start in zip(flights, on_copy, strict=True)
-    }
     best = max(optimum.value for optimum in optima.values())
     least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
     promising: list[str] = []
-    for name in optima:  # of flights that count as one the first: values hang on rounding
-        w = optima[name].trajectory.w
+    for name, optimum in optima.items():  # of flights that count as one the first
+        w = optimum.trajectory.w
         near = _SAME * float(np.ptp(w, axis=0).max())
         others = (optima[other].trajectory.w for other in promising)
-        if optima[name].value >= least and all(np.abs(w - other).max() > near for other in others):
+        if optimum.value >= least and all(np.abs(w - other).max() > near for other in others):
             promising.append(name)
-    ends = {name: optimum.trajectory for name, optimum in optima.items()}
+    improved = {name: optimum.trajectory for name, optimum in optima.items()}
     if copy is not kin:
-        kept = (*constraints_of(kin), *constraints(kin))
-        ends = {
-            name: feasible(kin, flights[name], resampled(copy, end, kin), kept)
-            for name, end in ends.items()
-        }
-    return ImprovedStarts(ends, promising)
+        limits = (*constraints_of(kin), *problem.constraints(kin))
+        for name, end in improved.items():
+            velocities = paced(kin, end, copy.time_step)
+            improved[name] = feasible(kin, flights[name], velocities, limits)
+    return improved, promising
 
 
 def coarse_copy(kin: Kinematics) -> Kinematics:
@@ -140,26 +121,15 @@ def coarse_copy(kin: Kinematics) -> Kinematics:
     )
 
 
-def resampled(kin: Kinematics, flight: Trajectory, other: Kinematics) -> Real:
-    """Return the velocities of `flight`, one of `kin`, at the slots of `other`, (slots, 2)."""
-    now, then = (k.time_step * np.arange(k.slots) for k in (kin, other))
-    velocities = np.stack([np.interp(then, now, v) for v in flight.v.T], axis=1)
-    if other.start_velocity is not None:
-        velocities[0] = other.start_velocity
-    elif kin.start_velocity is not None:
-        velocities[0] = flight.v[1]
-    return velocities
-
-
-def stretched(kin: Kinematics, flight: Trajectory) -> Real:
+def paced(kin: Kinematics, flight: Trajectory, time_step: float) -> Real:
     """Return the velocities (slots, 2) at which the path of `flight` takes the time of `kin`.
 
-    The longer it takes the less speed and acceleration it needs. With velocities of the ends that
-    are zero or free, and in calm air, the rates along it have nearly the same means.
+    The slots of `flight` are of `time_step` s. The longer it takes the less speed and acceleration
+    it needs. With velocities of the ends that are zero or free, and in calm air, the rates along it
+    have nearly the same means.
     """
-    share = np.linspace(0, 1, len(flight.v))
-    faster = (len(flight.v) - 1) / (kin.slots - 1)
-    at = np.linspace(0, 1, kin.slots)
+    faster = time_step * (len(flight.v) - 1) / (kin.time_step * (kin.slots - 1))
+    share, at = np.linspace(0, 1, len(flight.v)), np.linspace(0, 1, kin.slots)
     velocities = faster * np.stack([np.interp(at, share, v) for v in flight.v.T], axis=1)
     for n, given in ((0, kin.start_velocity), (-1, kin.end_velocity)):
         if given is not None:
