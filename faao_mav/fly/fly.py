@@ -66,9 +66,9 @@ def fly_mission(
         judged = arm or flight.streamed or not vehicle.armed
         asked = tuple(part for part in MissionType if judged or lists[part])
         held = session.run(read_held(peer, asked, parameters=judged))
-        for part, outcome in held.missing.items():
+        for part, report in held.missing.items():
             if lists[part]:
-                raise LinkError(f"{connection}: {session.not_read(part, outcome)}")
+                raise LinkError(f"{connection}: {session.not_read(report)}")
         wrong = [
             each
             for part in MissionType

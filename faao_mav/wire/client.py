@@ -13,16 +13,10 @@ from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.jobs import (
-    Lists,
-    download_lists,
-    explain,
-    upload_parts,
-    what_is_left,
-)
+from faao_mav.wire.jobs import Lists, download_lists, explain, upload_parts, what_is_left
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Talk
-from faao_mav.wire.messages import GlobalPositionInt, HomePosition, WireItem
+from faao_mav.wire.messages import GlobalPositionInt, HomePosition
 from faao_mav.wire.parameters import Change, check_settable, set_parameters
 from faao_mav.wire.protocol import (
     GROUND_STATION,
@@ -134,42 +128,27 @@ def upload(
                 raise LinkError(f"{connection}: {mistake}: nothing is uploaded")
         peer.may_be_armed = allow_armed
         lists = {part: wire_items(mission, part, peer.vehicle) for part in MissionType}
+        parts = [each for each in lists.items() if each[1] or clear_rest]
+
+        def put() -> Talk[UploadReport]:
+            told = yield from ask_for(peer.address, POSITION, GlobalPositionInt)
+            changes, problem = yield from set_parameters(parameters or {}, peer)
+            reports = () if problem else (yield from upload_parts(parts, peer))
+            problems = [problem] if problem else []
+            for each in reports:
+                if not each.verified:
+                    unheard = each.verdict == "silent" and each.item is None
+                    why = session.why_silent() if unheard else ""
+                    problems.append(explain(each, peer, mission) + why)
+            place = None if told is None else place_in(told)
+            stands = None if place is None else Whereabouts.of(place, mission)
+            seconds = time.monotonic() - session.started
+            return UploadReport(found, reports, seconds, tuple(problems), stands, changes)
+
         try:
-            told, changes, problem, parts = session.run(
-                _put(lists, parameters or {}, peer, clear_rest)
-            )
+            return session.run(put())
         except LinkError as error:
             raise LinkError(f"{error}. {what_is_left(peer)}") from None
-        problems = [problem] if problem else []
-        for part in parts:
-            if not part.verified:
-                unheard = part.verdict == "silent" and part.item is None
-                why = session.why_silent() if unheard else ""
-                problems.append(explain(part, peer, mission) + why)
-        seconds = time.monotonic() - session.started
-    place = place_in(told) if told else None
-    stands = None if place is None else Whereabouts.of(place, mission)
-    return UploadReport(found, parts, seconds, tuple(problems), stands, changes)
-
-
-def _put(
-    lists: Mapping[MissionType, tuple[WireItem, ...]],
-    parameters: Mapping[str, float],
-    peer: Peer,
-    clear_rest: bool,
-) -> Talk[tuple[GlobalPositionInt | None, tuple[Change, ...], str, tuple[PartReport, ...]]]:
-    """Set `parameters`, then upload `lists`, and clear those that are empty if asked to.
-
-    Return where the vehicle is, the changes of parameters and in words what went wrong with them,
-    and what became of the lists.
-    """
-    told = yield from ask_for(peer.address, POSITION, GlobalPositionInt)
-    changes, problem = yield from set_parameters(parameters, peer)
-    if problem:
-        return told, changes, problem, ()
-    parts = [each for each in lists.items() if each[1] or clear_rest]
-    reports = yield from upload_parts(parts, peer)
-    return told, changes, problem, reports
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,13 +183,21 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     """
     with Session(connection, knocks=True, **options) as session:
         peer = session.peer
-        lists, told = session.run(_all_held(peer))
-        missing = {part: session.not_read(part, why) for part, why in lists.missing.items()}
+
+        def read() -> Talk[tuple[Lists, HomePosition | None]]:
+            lists, told = (yield from download_lists(tuple(MissionType), peer)), None
+            flown = lists.items.get(MissionType.MISSION)
+            if flown is not None and not flown[: home_items(peer.vehicle, MissionType.MISSION)]:
+                told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
+            return lists, told
+
+        lists, told = session.run(read())
+        missing = {part: session.not_read(report) for part, report in lists.missing.items()}
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
         try:
             mission = mission_of(lists.items, peer.vehicle)
-            if mission.home is None and told is not None:
+            if told is not None:
                 mission = replace(mission, home=home_in(told))
         except InputError as error:
             raise LinkError(
@@ -220,70 +207,36 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     return Holdings(session.found, mission, tuple(missing.values()))
 
 
-def _all_held(peer: Peer) -> Talk[tuple[Lists, HomePosition | None]]:
-    """Read all lists, and the home that is not among them."""
-    lists = yield from download_lists(tuple(MissionType), peer)
-    flown = lists.items.get(MissionType.MISSION)
-    if flown is None or flown[: home_items(peer.vehicle, MissionType.MISSION)]:
-        return lists, None
-    return lists, (yield from ask_for(peer.address, HOME_POSITION, HomePosition))
-
-
 class Session(WireLink):
     """A link to the one vehicle that has been found; to be used in a `with` statement.
 
-    The arguments are those of `LinkOptions`. With `knocks` a vehicle is woken up that waits for a
-    heartbeat on a serial line: see `discover`.
+    With `knocks` a vehicle is woken up that waits for a heartbeat on a serial line: see `discover`.
     """
 
     def __init__(
-        self,
-        connection: str,
-        *,
-        knocks: bool = False,
-        system: int | None = None,
-        component: int | None = None,
-        own_system: int | None = None,
-        log: Path | None = None,
-        signing_key: Path | None = None,
-        wait: float = 10.0,
-        timeouts: Timeouts | None = None,
-        observe: Observe | None = None,
-        note: Callable[[str], object] | None = None,
+        self, connection: str, *, knocks: bool = False, **options: Unpack[LinkOptions]
     ) -> None:
         self.started = time.monotonic()
-        self._key_file = signing_key
-        self._signing = None if signing_key is None else read_signing(signing_key)
+        self._key_file = options.get("signing_key")
+        self._signing = None if self._key_file is None else read_signing(self._key_file)
+        own = options.get("own_system") or GROUND_STATION.system
         super().__init__(
             connection,
             signing=self._signing,
-            log=log,
-            address=Address(own_system or GROUND_STATION.system, GROUND_STATION.component),
-            note=note or warnings.warn,
-            observe=observe or (lambda *_: None),
+            log=options.get("log"),
+            address=Address(own, GROUND_STATION.component),
+            note=options.get("note") or warnings.warn,
+            observe=options.get("observe") or (lambda *_: None),
         )
-        timeouts = timeouts or Timeouts()
-        search = discover(
-            system,
-            component,
-            patience=wait,
-            listens=self.listens,
-            knocks=knocks and parse_connection(connection).kind == "serial",
-        )
+        timeouts = options.get("timeouts") or Timeouts()
         try:
-            heard = self.run(search)
-            for verdict, text in _PASSED_OVER.items():
-                if self._signing and not heard.vehicles and verdict in self.codec.heard:
-                    told = text.format(key=signing_key)
-                    raise LinkError(f"{connection}: no vehicle: {told}")
-            self.found = choose(heard, connection, system, component, wait)
+            self.found = self._found(connection, knocks, options)
             self.bind(self.found.address, *self.found.origins)
             self._check_alive(connection, timeouts)
         except BaseException:
             self.close()
             raise
-        ends = self.address, self.found.address
-        self.peer = Peer(*ends, self.found.vehicle, timeouts=timeouts)
+        self.peer = Peer(self.address, self.found.address, self.found.vehicle, timeouts=timeouts)
 
     def close(self) -> None:
         """Let go of the link; say what became of the log, keep the time of the last packet."""
@@ -293,13 +246,23 @@ class Session(WireLink):
         if self.log is not None and self.log.failure is not None:
             self._note(self.log.failure)
 
+    def _found(self, connection: str, knocks: bool, options: LinkOptions) -> FoundVehicle:
+        """Return the vehicle; raises `LinkError`."""
+        which, wait = (options.get("system"), options.get("component")), options.get("wait", 10.0)
+        knocks = knocks and parse_connection(connection).kind == "serial"
+        heard = self.run(discover(*which, patience=wait, listens=self.listens, knocks=knocks))
+        for verdict, text in _PASSED_OVER.items():
+            if self._signing and not heard.vehicles and verdict in self.codec.heard:
+                told = text.format(key=self._key_file)
+                raise LinkError(f"{connection}: no vehicle: {told}")
+        return choose(heard, connection, *which, wait)
+
     def _check_alive(self, connection: str, timeouts: Timeouts) -> None:
         """Raise `LinkError` for a recording, and for a vehicle that does not read MAVLink 2."""
         old = self.found.address not in self.codec.modern
         if self._signing is None and not old:
             return
-        asked = ask_alive(self.found.address, secrets.randbits(62), timeouts.silence)
-        if self.run(asked):
+        if self.run(ask_alive(self.found.address, secrets.randbits(62), timeouts.silence)):
             return
         why = (
             "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "
@@ -313,14 +276,14 @@ class Session(WireLink):
             )
         raise LinkError(f"{connection}: {self.found}: {why}")
 
-    def not_read(self, part: MissionType, report: PartReport) -> str:
+    def not_read(self, report: PartReport) -> str:
         """Return in words why a list was not read."""
         why = "the vehicle stopped answering"
         if report.result is not None:
             why = f"refused: {meaning(report.result, self.peer.manners.meanings)}"
-        elif part is MissionType.MISSION:
+        elif report.part is MissionType.MISSION:
             why += self.why_silent()
-        return f"{part.title}: not read: {why}"
+        return f"{report.part.title}: not read: {why}"
 
     def why_silent(self) -> str:
         """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
