@@ -177,7 +177,7 @@ class StoredLists:
         if part != upload.part or upload.sending:
             return _ack(sender, part, MavResult.ERROR)
         if self._alone:
-            self._legacy = message.legacy
+            self._legacy = False
         if seq != upload.passed:
             silent = self._manners.ignores_other_items
             return [] if silent else _ack(sender, part, MavResult.INVALID_SEQUENCE)
@@ -233,7 +233,7 @@ class StoredLists:
         if seq >= len(items):
             wrong = MavResult.ERROR if part is MissionType.MISSION else MavResult.INVALID_SEQUENCE
             return _ack(sender, part, wrong)
-        return [messages.MissionItemInt(sender, part, seq, items[seq], request.legacy)]
+        return [messages.MissionItemInt(sender, part, seq, items[seq])]
 
     def _on_ack(self, part: MissionType, result: int, under_way: _Transfer) -> list[Message]:
         if result == MavResult.UNSUPPORTED and not under_way.sending:

@@ -1,22 +1,14 @@
 """Packets to messages and back, by pymavlink, always MAVLink 2."""
 
-import math
 import re
 from dataclasses import dataclass, fields
 from typing import Any
 
 from faao_mav.wire import messages
 from faao_mav.wire.framing import Framer, is_signed, payload_of, sender_of
-from faao_mav.wire.messages import (
-    Envelope,
-    Message,
-    MissionItemInt,
-    MissionRequestInt,
-    WireItem,
-)
+from faao_mav.wire.messages import Envelope, Message, WireItem
 from faao_mav.wire.protocol import Address
 from faao_mav.wire.signing import Signing, Verdict
-from faao_mav.wire.wire_items import coordinate_scale
 
 _KINDS: dict[str, type[Message]] = {
     re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).upper(): kind
@@ -26,11 +18,8 @@ _KINDS: dict[str, type[Message]] = {
 """Message types by their MAVLink names."""
 
 _NAMES = {kind: name for name, kind in _KINDS.items()}
-_LEGACY: dict[str, type[Message]] = {
-    "MISSION_REQUEST": MissionRequestInt,
-    "MISSION_ITEM": MissionItemInt,
-}
-"""Predecessors with the same fields."""
+_LEGACY = "MISSION_REQUEST"
+"""The predecessor of MISSION_REQUEST_INT, with the same fields."""
 
 _BEYOND = ("opaque_id", "mission_id")
 """Fields behind those that the dialects of pymavlink know, of 4 bytes."""
@@ -60,7 +49,7 @@ class Codec:
         self.heard: set[Verdict] = set()
         self.modern: set[Address] = set()
         self._dialect: Any = development
-        self._reader: Any = development.MAVLink(None)
+        self._reader: Any = development.MAVLink(None)  # without a key: `signing` judges
         self._mav: Any = development.MAVLink(None, address.system, address.component)
         if signing is not None:
             self._mav.signing.secret_key = signing.key
@@ -71,11 +60,12 @@ class Codec:
         name = _NAMES[type(message)]
         values = {field.name: getattr(message, field.name) for field in fields(message)}
         if values.pop("legacy", False):
-            name = name.removesuffix("_INT")
+            name = _LEGACY
         if (target := values.pop("target", None)) is not None:
             values |= {"target_system": target.system, "target_component": target.component}
         if (item := values.pop("item", None)) is not None:
-            values |= _item_values(item, exact=name.endswith("_INT"))
+            values |= {field.name: getattr(item, field.name) for field in fields(item)}
+            values |= {f"param{number}": value for number, value in enumerate(item.params, 1)}
         kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
         numbers: list[Any] = []
         for field, length in zip(kind.ordered_fieldnames, kind.array_lengths, strict=True):
@@ -111,62 +101,38 @@ class Codec:
             verdict = self._signing.judge(raw, sender)
         if payload_of(raw) is not None:
             self.modern.add(sender)
-        envelope = self._envelope(message, raw, origin)
+        envelope = _envelope(message, raw, origin)
         if envelope is not None:
             self.heard.add(verdict)
         passed_over = self._signing is not None and verdict != "signed"
         return None if passed_over else Packet(raw, envelope)
 
-    def _envelope(self, packet: Any, raw: bytes, origin: str) -> Envelope | None:
-        name = packet.get_type()
-        kind = _KINDS.get(name) or _LEGACY.get(name)
-        if kind is None:
-            return None
-        legacy = name in _LEGACY
-        values: dict[str, Any] = {}
-        for field in fields(kind):
-            match field.name:
-                case "target":
-                    values["target"] = Address(packet.target_system, packet.target_component)
-                case "opaque_id" | "mission_id" as beyond:
-                    rest = (payload_of(raw) or b"")[packet.unpacker.size :]
-                    values[beyond] = int.from_bytes(rest[:4], "little")
-                case "legacy":
-                    values["legacy"] = legacy
-                case "item":
-                    values["item"] = _wire_item(packet, exact=not legacy)
-                    if values["item"] is None:
-                        return None
-                case plain:
-                    values[plain] = _text_or_number(getattr(packet, plain))
-        return Envelope(sender_of(raw), kind(**values), origin)
 
-
-def _item_values(item: WireItem, *, exact: bool) -> dict[str, Any]:
-    """Return the fields of MISSION_ITEM_INT, or of MISSION_ITEM (not `exact`), for `item`."""
-    values = {field.name: getattr(item, field.name) for field in fields(item)}
-    values |= {f"param{number}": value for number, value in enumerate(item.params, start=1)}
-    if exact:
-        return values
-    scale = coordinate_scale(item.frame)
-    return values | {"x": item.x / scale, "y": item.y / scale}
-
-
-def _wire_item(packet: Any, *, exact: bool) -> WireItem | None:
-    """Return the item that MISSION_ITEM_INT, or MISSION_ITEM (not `exact`), carries."""
-    x, y = packet.x, packet.y
-    if not exact:
-        if not (math.isfinite(x) and math.isfinite(y)):
-            return None
-        scale = coordinate_scale(packet.frame)
-        x, y = round(x * scale), round(y * scale)
-    params = (packet.param1, packet.param2, packet.param3, packet.param4)
-    flags = (packet.current, packet.autocontinue)
-    return WireItem(packet.command, packet.frame, params, x, y, packet.z, *flags)
-
-
-def _text_or_number(value: Any) -> Any:
-    """Return a field as it is, or its text on one line: what moves a terminal's cursor is blank."""
-    if not isinstance(value, str):
-        return value
-    return "".join(letter if letter.isprintable() else " " for letter in value)
+def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
+    """Return what `packet` says, None where its message is not known here."""
+    name = packet.get_type()
+    legacy = name == _LEGACY
+    kind = _KINDS.get(f"{name}_INT" if legacy else name)
+    if kind is None:
+        return None
+    values: dict[str, Any] = {}
+    for field in fields(kind):
+        match field.name:
+            case "target":
+                value: Any = Address(packet.target_system, packet.target_component)
+            case "opaque_id" | "mission_id":
+                rest = (payload_of(raw) or b"")[packet.unpacker.size :]
+                value = int.from_bytes(rest[:4], "little")
+            case "legacy":
+                value = legacy
+            case "item":
+                p = packet
+                params = (p.param1, p.param2, p.param3, p.param4)
+                flags = (p.current, p.autocontinue)
+                value = WireItem(p.command, p.frame, params, p.x, p.y, p.z, *flags)
+            case plain:
+                value = getattr(packet, plain)
+                if isinstance(value, str):  # on one line: what moves a terminal's cursor is blank
+                    value = "".join(each if each.isprintable() else " " for each in value)
+        values[field.name] = value
+    return Envelope(sender_of(raw), kind(**values), origin)

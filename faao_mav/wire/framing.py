@@ -39,7 +39,7 @@ class Framer:
             if stream[place] not in _AROUND:
                 place += 1
                 continue
-            end = place + length_of(stream[place : place + 3])
+            end = place + _length_of(stream[place : place + 3])
             if end > len(stream):
                 break
             if stream[place] == _MAVLINK_1 or stream[place + 2] <= _SIGNED:
@@ -54,7 +54,7 @@ class Framer:
         Where it begins with a whole one, what is missing of the packet before it was cut off. Else
         it may go on with that one, as what comes from serial lines by a bridge does.
         """
-        if 0 < length_of(data[:3]) <= len(data):
+        if 0 < _length_of(data[:3]) <= len(data):
             self._rest = b""
         return self.feed(data)
 
@@ -82,7 +82,7 @@ def message_id(packet: bytes) -> int:
     return int.from_bytes(packet[7:10], "little")
 
 
-def length_of(header: bytes) -> int:
+def _length_of(header: bytes) -> int:
     """Return how long the packet is that begins with the three bytes `header`, or with fewer.
 
     It is 0 where none begins.

@@ -66,11 +66,10 @@ class MissionRequestInt(ListMessage):
 
 
 class MissionItemInt(ListMessage):
-    """MISSION_ITEM_INT, or its predecessor MISSION_ITEM (`legacy`), which has single precision."""
+    """MISSION_ITEM_INT."""
 
     seq: int
     item: WireItem
-    legacy: bool = False
 
 
 class MissionAck(ListMessage):

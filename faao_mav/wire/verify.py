@@ -19,9 +19,6 @@ _CENTIMETRE = 0.0101
 _FLOAT32 = 2e-7
 """Relative difference of two numbers that single precision does not tell apart."""
 
-_FIELDS = ("command", "param1", "param2", "param3", "param4", "x", "y", "z", "autocontinue")
-"""The numbers of an item, by name."""
-
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
 """Frames with the same meaning: those ending in _INT, and what they are called without."""
 
@@ -66,12 +63,12 @@ def compare(
     differences: list[Difference] = []
     home = home_items(vehicle, part)
     if home and sent and found:
-        was, is_ = ((item.x, item.y, item.z) for item in map(mission_item, (sent[0], found[0])))
-        away = [abs(one - other) for one, other in zip(was, is_, strict=True)]
-        if any(was) and not (max(away[:2]) < 1e-5 and away[2] < 1):
-            differences.append(Difference(part, None, "home", was, is_, "dropped"))
+        own, its = ((item.x, item.y, item.z) for item in map(mission_item, (sent[0], found[0])))
+        away = [abs(one - other) for one, other in zip(own, its, strict=True)]
+        if any(own) and not (max(away[:2]) < 1e-5 and away[2] < 1):
+            differences.append(Difference(part, None, "home", own, its, "dropped"))
     if len(sent) != len(found):
-        given, there = (max(len(items) - home, 0) for items in (sent, found))
+        given, there = (len(items[home:]) for items in (sent, found))
         differences.append(Difference(part, None, "count", given, there, "wrong"))
     for index, (one, other) in enumerate(zip(sent[home:], found[home:], strict=False)):
         differences += _compare(mission_item(one), mission_item(other), index, part, vehicle)
@@ -89,32 +86,32 @@ def _compare(
     if vehicle is not None:
         stored = vehicle.dialect.stored(sent)
         unknown = part is MissionType.MISSION and not vehicle.dialect.is_known(sent.command)
-    sent_frame, found_frame, kept_frame = (
-        _SAME_FRAMES.get(item.frame, item.frame) for item in (sent, found, stored)
-    )
-    if found_frame not in (sent_frame, kept_frame):
-        yield Difference(part, index, "frame", sent.frame, found.frame, "wrong")
-    values = zip(_values(sent), _values(found), _values(stored), strict=True)
-    for field, (was, is_, kept) in zip(_FIELDS, values, strict=True):
+    of_sent, of_found, of_stored = map(_values, (sent, found, stored))
+    for field, was in of_sent.items():
+        is_, kept = of_found[field], of_stored[field]
         unset = math.isnan(was) and is_ == 0
         idle = field == "autocontinue" and part is not MissionType.MISSION
-        if unset or idle or _same(field, was, is_, sent.frame):
+        lost = _same(field, kept, is_, found.frame)
+        if unset or idle or _same(field, was, is_, sent.frame) or (lost and field == "frame"):
             continue
         # What is not known to be kept may be lost, but not replaced.
-        lost = _same(field, kept, is_, found.frame) or (
-            unknown and field not in ("x", "y", "command") and is_ == 0
-        )
+        lost = lost or (unknown and field not in ("frame", "x", "y", "command") and is_ == 0)
         yield Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
 
 
-def _values(item: MissionItem) -> tuple[float, ...]:
-    """Return the values of `_FIELDS`."""
-    return (item.command, *item.params, item.x, item.y, item.z, float(item.autocontinue))
+def _values(item: MissionItem) -> dict[str, float]:
+    """Return the numbers of an item by name."""
+    params = {f"param{number}": value for number, value in enumerate(item.params, start=1)}
+    place = {"x": item.x, "y": item.y, "z": item.z}
+    flags = {"command": item.command, "frame": item.frame, "autocontinue": item.autocontinue}
+    return {**flags, **params, **place}
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:
     if math.isnan(one) or math.isnan(other):
         return math.isnan(one) and math.isnan(other)
+    if field == "frame":
+        return _SAME_FRAMES.get(int(one), one) == _SAME_FRAMES.get(int(other), other)
     if field in ("x", "y"):
         return abs(one - other) * coordinate_scale(frame) < 1.5
     return abs(one - other) <= _FLOAT32 * abs(one) + (_CENTIMETRE if field == "z" else 0.0)

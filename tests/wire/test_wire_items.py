@@ -147,9 +147,6 @@ def test_items_survive_the_wire_to_the_last_digit() -> None:
     assert (found.x, found.y, found.z) == (ROW.x, ROW.y, ROW.z)
     assert found.params[3] == struct.unpack("<f", struct.pack("<f", math.pi))[0]
     assert (found.current, found.autocontinue) == (1, 0)
-    (old,) = Codec(GROUND_STATION).parse(packets(dataclasses.replace(item, legacy=True))[0])
-    assert message_of(old).legacy
-    assert 0 < abs(message_of(old).item.y - ROW.y) < 100  # of single precision
 
 
 def test_pymavlink_reads_the_packets() -> None:
