@@ -81,18 +81,6 @@ def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded(
         mission_of({part: rows}, vehicle_of("px4"))
 
 
-def test_a_download_of_nonsense_writes_nothing(tmp_path: Path) -> None:
-    out, mock = tmp_path / "m.waypoints", mock_of("px4", beat=0.1)
-    mock.lists.replace(MissionType.FENCE, [row(5001, p=NAN)] * 3)
-    source = f"udpout:127.0.0.1:{(port := free_port())}"
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        command = ["download", "--from", source, "--system", "1", "--out", str(out)]
-        result = CliRunner().invoke(app, command)
-    assert result.exit_code == 1
-    assert "what the vehicle holds is no mission: fence: a polygon stops after 3" in result.stderr
-    assert not out.exists()
-
-
 class _Homeless(MockAutopilot):
     """It says that it stands off the Earth."""
 
@@ -236,16 +224,6 @@ def test_a_mission_goes_on_when_nobody_can_be_told_any_more(gone: str, tmp_path:
         assert client.wait(timeout=PATIENCE) != 0
         assert (mock.armed, mock.mode) == (True, 3)
     assert orders == [MavCommand.ARM, MavCommand.START]
-
-
-def test_a_hang_up_is_ignored_where_it_was() -> None:
-    """Under `nohup` a session outlives its terminal."""
-    code = (
-        "import signal, faao_mav.cli.main as main; signal.signal(signal.SIGHUP, signal.SIG_IGN);"
-        "main.app = lambda: print(signal.getsignal(signal.SIGHUP).name); main.run()"
-    )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert result.stdout == "SIG_IGN\n"
 
 
 def test_a_link_that_breaks_in_an_upload_says_what_is_left(

@@ -20,19 +20,16 @@ from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import Timeouts, download, upload
-from faao_mav.wire.client import LinkOptions, holdings
+from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import FoundVehicle, Heard, choose, discover
 from faao_mav.wire.framing import message_id, sender_of
-from faao_mav.wire.link import WireLink
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
     Message,
-    MissionRequestList,
     Statustext,
-    Timesync,
 )
 from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address
 
@@ -113,12 +110,6 @@ def test_another_component_is_it_only_where_there_is_no_first() -> None:
     two, _ = found([(0.5, COMPANION, BEAT), (0.6, Address(1, 2), BEAT)])
     with pytest.raises(LinkError, match=r"several autopilots: .* Choose one with --component"):
         choose(Heard(two), "udpin:0.0.0.0:14550", None, None, 10.0)
-
-
-def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
-    armed = Heartbeat(COPTER, ARDUPILOT, ARMED, 0, 4)
-    (vehicle,), _ = found([(0.1, VEHICLE, armed), (0.5, VEHICLE, BEAT)])
-    assert vehicle.armed
 
 
 def test_what_else_was_heard_is_told() -> None:
@@ -237,17 +228,6 @@ def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "If the vehicle's address has changed, begin again" in notes[0]
 
 
-def test_a_mock_answers_who_asked() -> None:
-    """What one is answered nobody else hears; what it says by itself is for everybody."""
-    asked = Codec(GROUND_STATION).pack(MissionRequestList(VEHICLE, 0))
-    air, mock = Air(lambda _: [], waiting=[(asked, HERE)]), a_mock()
-    with WireLink(air, address=VEHICLE) as link:
-        link.begin(mock)
-        link.step(mock, time.monotonic())
-    to = {message_id(data): to for data, to in air.sent}
-    assert (to[44], to[0]) == (HERE, None)  # MISSION_COUNT, HEARTBEAT
-
-
 # ---- who speaks
 
 
@@ -294,16 +274,6 @@ def test_a_vehicle_that_takes_orders_of_one_number_only(monkeypatch: pytest.Monk
     assert senders == {GROUND_STATION.system, 255}
 
 
-def test_who_is_looked_for_is_asked_not_told() -> None:
-    """Of a vehicle that answers where it is spoken to it has to be heard that we are there."""
-    search: Any = Script(discover(patience=4.5))
-    asked = list(search.start(0.0))
-    for now in range(1, 6):
-        asked += search.tick(float(now))
-    assert [type(each) for each in asked] == [Timesync] * 5
-    assert search.outcome.vehicles == ()
-
-
 def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
     """PX4 1.13 and 1.14 on USB; it is that of no ground station, and only into a silence."""
 
@@ -322,27 +292,6 @@ def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
     assert asks() == [(2.0, 18), (3.0, 18), (4.0, 18), (5.0, 18)]
     assert asks((3.5, Statustext(6, "booting"))) == [(2.0, 18), (3.0, 18)]
     assert asks((0.5, Statustext(6, "booting"))) == []
-
-
-def test_only_transfers_knock(monkeypatch: pytest.MonkeyPatch) -> None:
-    knocks = list[bool]()
-
-    def looked(*names: Any, **options: Any) -> Any:
-        knocks.append(options["knocks"])
-        return discover(*names, **options)
-
-    monkeypatch.setattr("faao_mav.wire.client.discover", looked)
-    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Air(lambda _: []))
-    options = LinkOptions(wait=0.05)
-    for connection in ("/dev/ttyACM0", "udpin:0.0.0.0:1"):
-        for job in (
-            lambda to: upload(a_mission(5), to, **options),
-            lambda to: holdings(to, **options),
-            lambda to: fly_mission(Flight(a_mission(5)), to, **options),
-        ):
-            with pytest.raises(LinkError, match="no heartbeat"):
-                job(connection)
-    assert knocks == [True, True, False, False, False, False]
 
 
 # ---- MAVLink 1

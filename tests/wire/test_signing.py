@@ -3,7 +3,6 @@
 import hashlib
 import math
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import Timeouts, upload
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.messages import Heartbeat, Statustext
+from faao_mav.wire.messages import Statustext
 from faao_mav.wire.protocol import GROUND_STATION
 from faao_mav.wire.signing import Signing, read_signing, remember
 from faao_mav.wire.transport import Transport, open_transport
@@ -106,7 +105,7 @@ def test_times_of_sent_packets_grow_whatever_the_clock_does() -> None:
     assert heard.next_tick() == ticks[0] + 5_000_001  # the guide: after all that was heard
 
 
-def test_keys_in_files(key_file: Path) -> None:
+def test_what_is_no_key_file_or_is_not_its_owners_alone_is_refused(key_file: Path) -> None:
     assert read_signing(key_file).key == KEY
     key_file.write_text(KEY.hex() + "\n")
     assert read_signing(key_file).key == KEY
@@ -114,9 +113,6 @@ def test_keys_in_files(key_file: Path) -> None:
     with pytest.raises(InputError, match="expected a signing key: 32 bytes, or 64 hex") as caught:
         read_signing(key_file)
     assert "sesame" not in str(caught.value)
-
-
-def test_what_is_no_key_file_or_is_not_its_owners_alone_is_refused(key_file: Path) -> None:
     os.mkfifo(key_file.with_name("PIPE"))
     for path in ("/dev/urandom", "PIPE", ".", "none", "-"):
         with pytest.raises(InputError, match=r"is a device or a pipe|cannot be read"):
@@ -221,18 +217,3 @@ def test_another_key_or_none_is_told_as_such(
         pytest.raises(LinkError, match=told),
     ):
         upload(a_mission(5), connection, signing_key=key_file, wait=2.0)
-
-
-def test_a_heartbeat_is_not_enough_to_be_alive(
-    key_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A vehicle that is signed, and says nothing else: what a recording of heartbeats shows."""
-    codec = Codec(VEHICLE, Signing(KEY))
-
-    def beats(data: bytes | None) -> list[tuple[bytes, str]]:
-        time.sleep(0.02)
-        return [(codec.pack(Heartbeat(2, 12, 0, 0, 3)), "")] if data is None else []
-
-    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Air(beats, listens=False))
-    with pytest.raises(LinkError, match="no answer to a question that was never asked before"):
-        upload(a_mission(5), "udpout:127.0.0.1:9", system=1, signing_key=key_file, timeouts=HASTY)
