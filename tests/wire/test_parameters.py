@@ -73,18 +73,6 @@ def test_what_the_vehicle_does_not_know_is_named_in_time(kind: str) -> None:
     assert {*reading.outcome.missing} == {*known}
 
 
-def test_a_vehicle_has_one_name_of_each_parameter() -> None:
-    mock = mock_of("ardupilot")
-    values = mock.parameters.values
-    values["WP_SPD"] = values.pop("WPNAV_SPEED") / 100
-    reading = Script(
-        read_parameters(peer_of("ardupilot"), [("WP_SPD", "WPNAV_SPEED"), ("FENCE_ENABLE",)])
-    )
-    ran(reading, mock)
-    assert reading.outcome is not None
-    assert reading.outcome.values == {"WP_SPD": 10.0, "FENCE_ENABLE": 0.0}
-
-
 def test_other_vehicles_are_not_listened_to() -> None:
     desk = Desk(Script(read_parameters(peer_of("px4"), [("NAV_DLL_ACT",)])))
     desk.start()

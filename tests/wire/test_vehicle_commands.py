@@ -14,7 +14,6 @@ from stations import FENCE, HOME, RALLY, a_mission, vehicle_of
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot
-from faao_mav.cli.shared import progress
 from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
@@ -112,15 +111,6 @@ def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
     assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
     assert "not verified; do not fly it" in result.stderr
     assert "verified     " not in result.stdout
-
-
-def test_a_port_in_use_is_an_unusable_argument(mission_file: Path, port: int) -> None:
-    taken = f"udpin:127.0.0.1:{port}"
-    with running(a_mock(), taken):
-        for arguments in (("autopilot", "--listen"), ("upload", mission_file, "--to")):
-            result = run(*arguments, taken)
-            assert result.exit_code == 2
-            assert "the port is in use" in result.stderr
 
 
 def test_the_mock_autopilot_as_a_command(
@@ -226,17 +216,3 @@ def test_a_download_without_a_mission_writes_nothing(port: int, tmp_path: Path) 
     assert "mission: not read: the vehicle stopped answering" in result.stderr
     assert "no heartbeat of the autopilot of system 9 within 0.3 s" in nobody.stderr
     assert not out.exists()
-
-
-def test_progress_is_drawn_on_a_terminal_only(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name, value in (("FORCE_COLOR", "1"), ("COLUMNS", "100")):
-        monkeypatch.setenv(name, value)
-    for shown in (False, True):
-        with progress(shown=shown) as observe:
-            observe("asking for home", 0, 0)
-            observe("uploading mission", 3, 9)
-        drawn = capsys.readouterr()
-        assert drawn.out == ""
-        assert ("uploading mission, 3 of 9" in drawn.err) is shown
