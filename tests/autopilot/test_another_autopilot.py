@@ -160,12 +160,18 @@ def test_its_rules_are_its_dialect_and_its_table() -> None:
     assert message.endswith("ToyCopter stores 500 at most (NO_SPACE)")
 
 
-def test_its_files_and_numbers_are_known() -> None:
+def test_its_files_and_numbers_are_known_while_it_is() -> None:
     assert parameter_path(MISSIONS / "x.plan", "toy").name == "x.toy"
     assert autopilot_of({"TOY_SPEED": 1.0}) == "toy"
     assert render_parameters({"TOY_SPEED": 8.0}, TOY.parameter_style) == "TOY_SPEED,8\n"
     assert vehicle_type_by_numbers(99, 2) is COPTER
     assert Vehicle("toy", "copter", {"TOY_SPEED_KMH": 36}).value("cruise_speed") == 10
+    unregister(COPTER)
+    try:
+        with pytest.raises(PlanError, match=r"vehicle\.autopilot: 'toy' is not accepted"):
+            parse_plan(PLAN)
+    finally:
+        register(COPTER)
 
 
 def test_it_is_uploaded_to_its_mock_and_flown_there(tmp_path: Path) -> None:
@@ -182,12 +188,3 @@ def test_it_is_uploaded_to_its_mock_and_flown_there(tmp_path: Path) -> None:
             assert done.exit_code == 0, done.output
     assert json.loads(done.stdout.splitlines()[-1])["ending"] == "finished"
     assert not mock.armed
-
-
-def test_without_it_the_plan_is_refused_by_name() -> None:
-    unregister(COPTER)
-    try:
-        with pytest.raises(PlanError, match=r"vehicle\.autopilot: 'toy' is not accepted"):
-            parse_plan(PLAN)
-    finally:
-        register(COPTER)

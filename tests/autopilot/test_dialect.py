@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.autopilot.dialect import Limit, SpeedChange
+from faao_mav.autopilot.dialect import SpeedChange
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.item import as_received, as_sent
 
@@ -118,12 +118,6 @@ def test_what_is_refused() -> None:
     for command in (18, 82, 92, 115):
         for frame in (2, 3):
             assert "does not support" in str(refusal(MissionItem(command, frame), PX4))
-
-
-def test_limits() -> None:
-    assert [v.type.dialect.items for v in (COPTER, PLANE)] == [Limit(650, 718), Limit(650, 724)]
-    assert PX4.type.dialect.items.sure == 1000
-    assert COPTER.type.dialect.jumps == Limit(15, 100)
 
 
 def test_speed_changes() -> None:

@@ -1,0 +1,339 @@
+"""What holds for every flight of every model, and what was measured beside recorded flights.
+
+Of what is inside a model only what cannot be told from its flights is looked at: how long legs take
+without flying them.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flight_paths import bends, line, path_of, roughness, wandering
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from faao_mav.autopilot import FlightPath, Model, Vehicle
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
+from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs
+from faao_mav.autopilot.ardupilot.copter.target import Target
+from faao_mav.autopilot.ardupilot.plane import ArduPlane
+from faao_mav.autopilot.body import PX4_BODY, CopterBody, PlaneBody
+from faao_mav.autopilot.px4 import Px4
+from faao_mav.errors import InputError
+from faao_mav.plan import Wind
+from faao_mav.power import GRAVITY
+
+QUICK = ArduCopter(acceleration=4, jerk=10)
+SUITED = Px4(acceleration=5, jerk=20, error_limit=10, height_radius=3)
+PLANE = ArduPlane()
+COPTERS = [ArduCopter(), QUICK, ArduCopter(acceleration=1), Px4(), SUITED]
+
+
+@settings(max_examples=60)
+@given(wandering(climbs=True), st.sampled_from(COPTERS))
+def test_a_copters_motion_is_continuous_and_within_limits(
+    path: FlightPath, model: ArduCopter | Px4
+) -> None:
+    flown = model.fly(path, 0.05)
+    np.testing.assert_allclose(np.diff(flown.t), 0.05)
+    assert flown.t[0] == flown.arrivals[0] == 0
+    assert flown.t[-1] >= flown.departures[-1] - 1e-9
+    ground = np.hypot(*flown.velocity[:, :2].T)
+    assert ground.max() <= 1.25 * path.speeds.max() + 0.5
+    # Where two legs overlap both may climb.
+    assert flown.velocity[:, 2].max() <= 2 * model.climb_speed + 1e-9
+    assert flown.velocity[:, 2].min() >= -2 * model.descent_speed - 1e-9
+    middle = (flown.velocity[1:] + flown.velocity[:-1]) / 2
+    assert np.diff(flown.position, axis=0) / 0.05 == pytest.approx(middle, abs=0.4)
+    change = np.linalg.norm(np.diff(flown.velocity[:, :2], axis=0), axis=1) / 0.05
+    drag = model.body.linear_drag * ground + model.body.quadratic_drag * ground**2
+    most = 1.5 * math.sqrt(2) * model.acceleration + 0.5
+    if isinstance(model, ArduCopter):
+        most = GRAVITY * math.tan(model.lean_angle) + drag[1:] + 0.2
+        np.testing.assert_allclose(flown.departures - flown.arrivals, np.floor(path.holds))
+    assert (change <= most).all()
+    # PX4 leaves from within its radius, and some steps late; a long hold is spent at the place.
+    assert (flown.departures - flown.arrivals >= np.floor(path.holds) - 1e-9).all()
+    assert (flown.arrivals[1:] >= flown.departures[:-1]).all()
+    near = 2.0 if isinstance(model, ArduCopter) else model.acceptance_radius + 0.05
+    for point, when, wait in zip(path.points, flown.departures, path.holds, strict=True):
+        there = [np.interp(when, flown.t, x) for x in flown.position.T]
+        assert wait < 1 or np.hypot(*(there - point)[:2]) <= near
+
+
+@settings(max_examples=40)
+@given(wandering(shortest=0.0, climbs=True))
+def test_a_planes_motion_is_an_aeroplanes(path: FlightPath) -> None:
+    flown = PLANE.fly(path)
+    speed = np.linalg.norm(flown.velocity, axis=1)
+    assert 0.5 * PLANE.min_speed <= speed.min() <= speed.max() <= PLANE.max_speed
+    assert abs(flown.velocity[:, 2]).max() <= 2 * PLANE.climb_speed
+    moved = np.linalg.norm(np.diff(flown.position, axis=0), axis=1) / 0.1
+    assert moved.max(initial=0) <= speed.max() + 0.1
+    heading = np.unwrap(np.arctan2(flown.velocity[:, 1], flown.velocity[:, 0]))
+    turning = abs(np.diff(heading)) / 0.1
+    assert turning.max(initial=0) <= 2 * 9.81 * math.tan(PLANE.roll_limit) / speed.min()
+    assert (flown.arrivals[1:] >= flown.departures[:-1] - 1e-9).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.builds(
+        CopterBody,
+        lag=st.floats(0.05, 0.6),
+        linear_drag=st.floats(0, 2),
+        quadratic_drag=st.floats(0, 0.1),
+    ),
+    st.builds(PlaneBody, airspeed_lag=st.floats(0.05, 5), sideslip=st.floats(0, 0.9)),
+    st.floats(math.radians(5), math.radians(80)),
+)
+def test_whatever_the_body_a_flight_ends(copter: CopterBody, plane: PlaneBody, lean: float) -> None:
+    top = copter.top_airspeed(lean)
+    drag = (copter.linear_drag + copter.quadratic_drag * top) * top
+    assert math.isinf(top) or drag == pytest.approx(GRAVITY * math.tan(lean), rel=1e-6)
+    path = replace(path_of([0, 80, 80 + 80j, 200 + 80j], 8.0), longest=3000.0)
+    for autopilot in ("ardupilot", "px4"):
+        flown = Vehicle(autopilot, body=copter).flight_model().fly(path)
+        assert np.abs(flown.position[-1, :2] - [200, 80]).max() < 5
+    path = replace(path_of([0, 600, 600 + 600j], 15.0), longest=3000.0)
+    assert np.isfinite(Vehicle(kind="plane", body=plane).flight_model().fly(path).position).all()
+
+
+def test_arrivals_are_smooth_in_speeds() -> None:
+    for model, most in ((ArduCopter(), 5e-3), (QUICK, 5e-3), (Px4(), 4e-3), (SUITED, 4e-3)):
+        for leg in (3, 9):
+            path = bends(leg)
+            path.radii[:] = 3
+            assert roughness(model, path, leg) < most
+
+
+@pytest.mark.parametrize("model", [ArduCopter(), Px4(), PLANE])
+def test_one_point_is_only_held(model: Model) -> None:
+    flown = model.fly(path_of([3 + 4j], holds={0: 2.5}))
+    held = {ArduCopter: 2.0, Px4: 2.5, ArduPlane: 0.0}[type(model)]
+    assert flown.departures[0] == pytest.approx(held, abs=0.1)
+    np.testing.assert_allclose(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
+
+
+@pytest.mark.parametrize(
+    ("model", "up", "down"),
+    [(ArduCopter(climb_speed=2.0, descent_speed=1.0), 33.3, 62.3), (Px4(), 20.0, 40.0)],
+)
+def test_climbs_at_its_own_speed_on_the_straight_line(model: Model, up: float, down: float) -> None:
+    climb = model.fly(path_of([0, 40], 8, heights=[30, 90]))
+    sink = model.fly(path_of([0, 40], 8, heights=[90, 30]))
+    assert climb.departures[-1] == pytest.approx(up, abs=4)
+    assert sink.departures[-1] == pytest.approx(down, abs=5)
+    middle = climb.position[len(climb.t) // 2]
+    assert (middle[2] - 30) / 60 == pytest.approx(middle[0] / 40, abs=0.05)
+
+
+# ---- ArduCopter
+
+
+def test_measured_mean_speeds_by_spacing() -> None:
+    for model, speeds in (
+        (ArduCopter(), {2: 0.9, 5: 1.7, 10: 2.7, 20: 4.4, 40: 7.0}),
+        (ArduCopter(acceleration=5, jerk=5), {2: 1.4, 5: 2.7, 10: 4.5, 20: 7.2, 40: 8.0}),
+    ):
+        for spacing, speed in speeds.items():
+            legs = max(12, 240 // spacing)
+            arrivals = model.fly(line(spacing, legs)).arrivals
+            first, last = legs // 3, 2 * legs // 3
+            mean = spacing * (last - first) / (arrivals[last] - arrivals[first])
+            assert mean == pytest.approx(speed, abs=0.1), spacing
+
+
+def test_the_lean_angle_and_the_body_bound_its_speed() -> None:
+    for vehicle, top in (
+        (Vehicle(parameters={"ANGLE_MAX": 3000}), 10.3),  # measured
+        (Vehicle(parameters={"ANGLE_MAX": 4500}), 15.2),
+        (Vehicle(body=CopterBody(linear_drag=0.7)), None),
+    ):
+        flown = vehicle.flight_model().fly(line(1500, 1, 20.0))
+        fastest = np.hypot(*flown.velocity[:, :2].T).max()
+        assert fastest == pytest.approx(top or vehicle.top_airspeed, rel=0.05)
+
+
+def test_measured_lengths_of_legs() -> None:
+    """Measured at 8 m/s: 49 m with default parameters, 22 m with ACCEL 400 and JERK 10."""
+    for model, length in ((ArduCopter(), 49), (QUICK, 22)):
+        assert model.shortest_leg(np.array(8.0)) == pytest.approx(length, abs=1)
+
+
+def test_useless_speeds_are_refused() -> None:
+    for speed in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="speeds"):
+            ArduCopter().fly(path_of([0, 9], speed))
+
+
+@settings(max_examples=30)
+@given(wandering(shortest=12.0), st.sampled_from(COPTERS[:3]))
+def test_splines_pass_their_points(path: FlightPath, model: ArduCopter) -> None:
+    splines = np.arange(len(path.points)) > 0
+    flown = model.fly(replace(path, splines=splines), 0.05)
+    assert (np.diff(flown.arrivals) > 0).all()
+    np.testing.assert_allclose(flown.departures - flown.arrivals, np.floor(path.holds), atol=1e-9)
+    for point in path.points[:-1]:
+        assert np.linalg.norm(flown.position - point, axis=1).min() < 3.0
+
+
+def test_splines_pass_straight_legs_without_a_stop() -> None:
+    points = [0, 80, 140 + 40j, 200 + 80j, 300 + 80j]
+    splines = np.array([False, False, True, True, False])
+    flown = ArduCopter().fly(replace(path_of(points, 6), splines=splines))
+    between = (flown.t > flown.arrivals[1] - 5) & (flown.t < flown.arrivals[3] + 3)
+    assert np.linalg.norm(flown.velocity[between], axis=1).min() > 2.5
+
+
+def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:
+    """A degree of latitude has 110,574 m at the equator and 111,412 m at 60 degrees."""
+    equator, north = (ArduCopter.from_vehicle(Vehicle(), latitude) for latitude in (0.0, 60.0))
+    assert equator.north_metre == pytest.approx(111_318.845 / 110_574.3, rel=1e-5)
+    assert north.north_metre == pytest.approx(111_318.845 / 111_412.2, rel=1e-5)
+    flown = equator.fly(path_of([0, 2000j], 8))
+    np.testing.assert_allclose(flown.position[-1], [0, 2000, 30], atol=1.0)
+
+
+def test_the_jerk_rises_no_faster_than_the_aircraft_leans() -> None:
+    """Half of what leaning at 1100 degrees/s² gives is slower than ATC_INPUT_TC from 18 m/s³ on."""
+    assert ArduCopter(jerk=17).rise == pytest.approx(0.3)
+    half = 9.80665 * math.radians(1100) / 2
+    assert ArduCopter(jerk=20).rise == pytest.approx(math.pi * 20 / (2 * half))
+    assert ArduCopter(jerk=20, roll_acceleration=0, pitch_acceleration=0).rise == 0.3
+
+
+def test_measured_speeds_after_a_change_on_a_short_leg() -> None:
+    """As ArduCopter's log has them: legs of a mission with WPNAV_ACCEL 400 and WPNAV_JERK 20."""
+    lengths, before, told = np.array(
+        [[11.3, 24.6, 44.8], [1.992, 3.764, 7.71], [3.764, 8.202, 8.81]]
+    )
+    legs = StraightLegs(lengths, np.full(3, True), ArduCopter(acceleration=4.0, jerk=20.0))
+    assert legs.speeds(before, told)[2] == pytest.approx([2.32, 4.79, 7.71], abs=0.04)
+
+
+def test_legs_take_as_long_as_the_target_takes() -> None:
+    rng, worst = np.random.default_rng(1), []
+    for _ in range(300):
+        count = int(rng.integers(2, 7))
+        lengths, stops = rng.uniform(8, 120, count), np.ones(count + 1, dtype=bool)
+        stops[1:-1] = rng.random(count - 1) < 0.2
+        speeds = rng.uniform(1.5, 10, count)
+        limits = ArduCopter(acceleration=rng.uniform(1.5, 5), jerk=rng.uniform(5, 20))
+        points = np.zeros((count + 1, 3))
+        points[1:, 0] = np.cumsum(lengths)
+        legs = StraightLegs(lengths, ~stops[:-1], limits)
+        target = Target(points, speeds, np.zeros(count + 1, dtype=bool), stops, limits)
+        worst.append(np.abs(legs.flown(speeds)[1] - np.diff(target.passed)).max())
+        most = np.minimum(speeds, legs.most)  # what is commanded above makes no difference
+        np.testing.assert_allclose(legs.flown(most)[1], legs.flown(speeds)[1])
+    assert np.median(worst) < 0.05
+    assert np.quantile(worst, 0.9) < 0.3
+
+
+# ---- PX4
+
+
+def test_no_speed_means_cruise_speed_and_the_limit_holds() -> None:
+    for model, speed, fastest in (
+        (Px4(), 0.0, 5),
+        (Px4(cruise_speed=3), 0.0, 3),
+        (Px4(max_speed=6), 9.0, 6),
+    ):
+        flown = model.fly(line(200, 1, speed))
+        assert flown.velocity[:, 0].max() == pytest.approx(fastest, abs=0.3)
+
+
+def test_its_drag_may_grow_with_the_speed() -> None:
+    """At one speed a drag that grows with it is the linear one."""
+    bodies = [replace(PX4_BODY, linear_drag=k, quadratic_drag=q) for k, q in ((1, 0), (0, 0))]
+    bodies.append(replace(PX4_BODY, linear_drag=0.0, quadratic_drag=0.2))
+    flights = [Px4(body=each).fly(path_of([0, 150, 150 + 150j], 5.0)).position for each in bodies]
+    n = min(map(len, flights))
+    to_linear, to_none = (np.abs(flights[2][:n] - each[:n]).max() for each in flights[:2])
+    assert to_linear < to_none / 2
+
+
+def test_a_wide_radius_before_a_small_one_costs_speed() -> None:
+    """Flown by PX4 at 8 m/s round 15 degrees: 5.6 m/s with 9.9 m before 1.5 m."""
+    for radii, slowest in (([2, 9.9, 1.5, 2], 5.6), ([2, 9.9, 9.9, 2], 7.8)):
+        path = path_of([0, 50, 50 + 50 * np.exp(0.26j), 200])
+        path.radii[:] = radii
+        flown = SUITED.fly(path)
+        about = abs(flown.t - flown.arrivals[1]) < 2.5
+        speed = np.linalg.norm(flown.velocity[about], axis=1).min()
+        assert speed == pytest.approx(slowest, abs=0.5)
+
+
+def test_a_radius_as_long_as_its_leg_counts_at_once() -> None:
+    path = path_of([0, 60, 70, 120])
+    path.radii[2] = 15
+    flown = Px4().fly(path)
+    assert flown.arrivals[2] == pytest.approx(flown.departures[1])
+
+
+def test_radii_are_a_metre_at_least_and_none_narrows_in_a_corner() -> None:
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        room, turn = rng.uniform(1, 100, 12), rng.uniform(0, 3, 12) * (rng.uniform(size=12) < 0.7)
+        stops = rng.uniform(size=12) < 0.2
+        stops[[0, -1]] = True
+        radii = SUITED.radii(room, turn, stops)
+        assert radii.min() >= 1.0
+        corners = np.flatnonzero(((turn > 0.1) & ~stops)[:-1])
+        assert (radii[corners] <= radii[corners + 1] + 1e-9).all()
+
+
+# ---- ArduPlane
+
+
+def test_the_demanded_airspeed_falls_as_total_energy_control_lets_it() -> None:
+    """The autopilot's log shows 0.80 m/s², and 1.65 m/s² with TECS_SINK_MIN 3 and cruise 16."""
+    rates = ArduPlane(cruise_speed=22.0).speed_rates
+    assert rates.fall == pytest.approx(0.80, abs=0.01)
+    assert rates.power / 17.7 == pytest.approx(1.38, abs=0.01)
+    rates = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates
+    assert rates.fall == pytest.approx(1.65, abs=0.01)
+
+
+@given(speed=st.floats(0, 8), degrees=st.floats(0, 360))
+def test_a_wind_shifts_the_velocity_and_the_track_is_kept(speed: float, degrees: float) -> None:
+    """The airspeed V leads along the track at sqrt(V^2 - across^2) + along."""
+    wind = Wind(speed=speed, from_degrees=degrees).velocity
+    flown = PLANE.fly(replace(line(500, 2, 15.0), wind=wind))
+    np.testing.assert_allclose(flown.position[:, 1], 0, atol=0.05)
+    ground = math.sqrt(15**2 - wind[1] ** 2) + wind[0]
+    assert flown.arrivals[1] == pytest.approx(500 / ground, abs=0.25)
+    entered = replace(line(1000, 2, 15.0), wind=wind, entry=np.array([0.0, 14.0, 0.0]))
+    settled = PLANE.fly(entered)
+    np.testing.assert_allclose(settled.velocity[0, :2], [0, 14], atol=1e-9)
+    np.testing.assert_allclose(settled.velocity[-1, :2], [ground, 0], atol=0.2)
+    assert abs(settled.position[-1, 1]) < 1
+    with pytest.raises(InputError, match="perhaps for the wind"):
+        PLANE.fly(replace(line(500, 1, 15.0), wind=(-20.0 - speed, 0.0), longest=600.0))
+
+
+def test_airspeed_is_held_within_its_limits_and_higher_in_thin_air() -> None:
+    """Standard atmosphere, 684 m: the density is 0.9359 of that at sea level."""
+    for command, held in ((3, 9), (40, 22), (0, 12), (15, 15)):
+        for exponent, ratio in ((0.5, 1.0337), (1.0, 1.0337**2)):
+            plane = ArduPlane(body=PlaneBody(airspeed_exponent=exponent))
+            track = plane.fly(replace(line(1500, 1, float(command)), elevation=654.0))
+            speed = np.linalg.norm(track.velocity, axis=1)[-1]
+            assert speed == pytest.approx(held * ratio, rel=2e-3)
+
+
+def test_it_goes_on_at_the_velocity_of_a_take_off() -> None:
+    flown = PLANE.fly(replace(path_of([0, 800], 14.0), entry=np.array([26.0, 0.0, 6.0])))
+    np.testing.assert_allclose(flown.velocity[0], [26, 0, 6])
+    assert flown.position[:, 2].max() > 33
+    assert np.hypot(*flown.velocity[-1, :2]) == pytest.approx(14, abs=0.3)
+
+
+def test_it_climbs_along_the_leg_as_fast_as_it_may() -> None:
+    flown = PLANE.fly(path_of([0, 1000, 1500], 15.0, heights=[50, 100, 100]))
+    middle = int(flown.arrivals[1] / 0.1 / 2)
+    assert flown.position[middle, 2] == pytest.approx(75, abs=3)
+    climb = PLANE.fly(path_of([0, 100, 1500], 15.0, heights=[50, 200, 200])).velocity[:, 2]
+    assert np.median(climb[climb > 1]) == pytest.approx(5, abs=0.5)
