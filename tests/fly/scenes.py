@@ -110,6 +110,13 @@ def swift(*, fenced: bool = False) -> Solution:
     return optimize(parse_plan(edited(FLYABLE, changes)))
 
 
+@cache
+def waiting() -> Solution:
+    """Return a plan of 50 s for the small flight, which hovers in the middle."""
+    slow = {"flight.end": [50, 0], "flight.duration": 50, "radio.ground_user.position": [60, 60]}
+    return optimize(parse_plan(edited(FLYABLE, SWIFT | slow)))
+
+
 def away(metres: float, higher: float = 0.0) -> Home:
     """Return a place so many metres east of home."""
     frame = LocalFrame(HOME.latitude, HOME.longitude)
@@ -250,7 +257,7 @@ class Scene:
 
     def interrupt(self, now: float) -> None:
         """Press Ctrl-C; what is sent then is lost at first."""
-        self.client.sent += self.watch.cancel(now)
+        self.client.sent += self.client.cancel(now)
 
     def hang_up(self, now: float) -> None:
         """Close the terminal; what is sent then is lost at first."""
@@ -347,3 +354,12 @@ class AnotherStation(Machine[None]):
     def _time_out(self, now: float) -> Sequence[Message]:
         self._due = now + 1.0
         return [Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, 4)]
+
+
+class Companion(AnotherStation):
+    """A computer on board that tells a place and a mode of its own."""
+
+    def _time_out(self, now: float) -> Sequence[Message]:
+        self._due = now + 0.3
+        ms, place = round(now * 1000) + 5000, (round(HOME.latitude * 1e7), round(1e9), 9000, 9000)
+        return [Heartbeat(18, 8, 0, LOITER, 4), GlobalPositionInt(ms, *place, 0, 0, 0, 0)]
