@@ -4,6 +4,7 @@ Of the mission only the predicted flight counts, so any mission can be compared:
 it was edited in a ground station, as it was downloaded.
 """
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,18 +13,19 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.initial_route import begins_at_speed, set_out
+from faao_mav.schedule.initial_route import begins_at_speed
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.schedule.schedule import passing
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LinkCheck, Stretch
-from faao_mav.validate.flown import Line
+from faao_mav.validate.flown import Line, departure
 from faao_mav.vector import distances_to_path, lengths
 
-_LEADS = np.arange(0.0, MOST_LEAD + 0.05, 0.1)
-"""Seconds by which the aircraft may set out before the plan, of which the best fit is taken.
+_LEADS = np.arange(-MOST_LEAD, MOST_LEAD + 0.05, 0.1)
+"""Seconds about a departure like the plan's, of which the best fit is taken.
 
-The step of 0.1 s is that of predicted flights."""
+A mission sets out up to `MOST_LEAD` before its plan. The step of 0.1 s is that of predicted
+flights."""
 
 _EVERY = 10
 """Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen."""
@@ -88,38 +90,29 @@ def _unmeasured(solution: Solution) -> Iterator[str]:
 def predicted_line(solution: Solution, track: Track | None) -> Line:
     """Return the predicted flight `track` on the plan's clock; the plan itself without one.
 
-    The plan begins when the flight leaves the item nearest to w_I, or up to `MOST_LEAD` later, for
-    that lead for which plan and flight are closest at equal times, rms: a mission does not say its
-    lead. So is the item, where several are as near. A plan that begins at speed does when the
-    flight passes w_I.
+    The clock reads 0 when the flight departs from w_I most like the plan, or first comes near it
+    where no departure is like it: when it passes w_I, for a plan that begins at speed; else up to
+    `MOST_LEAD` earlier or later, when plan and flight are closest at equal times, rms: a mission
+    does not say its lead.
     """
     if track is None:
         return Line.planned(solution)
     origin = solution.plan.origin
     w, up = np.split(track.within(LocalFrame(origin.latitude, origin.longitude)), [2], axis=1)
     line = Line(track.t, w, up[:, 0])
-    return line._replace(t=track.t - _start(solution, track.reached, line))
-
-
-def _start(solution: Solution, reached: Real, line: Line) -> float:
-    """Return the time, s, on the clock of `line` at which the plan begins.
-
-    Its items are done at `reached`, s, NaN where that is no time.
-    """
-    waited = set_out(solution.t, solution.w, solution.plan) - solution.t[0]
-    left = reached[np.isfinite(reached)]
-    if len(left) == 0:
-        return float(line.t[0])
-    away = lengths(line.at(left) - solution.w[0])
-    near = left[away <= away.min() + solution.plan.mission.path_tolerance] - waited
+    off, start = departure(solution, Line.planned(solution), line)
+    if not math.isfinite(off):
+        away = lengths(w - solution.w[0])
+        start = float(line.t[np.argmax(away <= away.min() + solution.plan.mission.path_tolerance)])
 
     def apart(start: float) -> float:
         return float(np.mean(np.sum((line.at(solution.t + start) - solution.w) ** 2, axis=1)))
 
-    nearest = min(map(float, near), key=apart)
-    if waited == 0 and begins_at_speed(solution.t, solution.w):
-        return passing(line.t, line.w, solution.w[0], nearest)
-    return min((nearest + lead for lead in map(float, _LEADS)), key=apart)
+    if begins_at_speed(solution.t, solution.w):
+        start = passing(line.t, w, solution.w[0], start)
+    else:
+        start = min((start + _LEADS).tolist(), key=apart)
+    return line._replace(t=track.t - start)
 
 
 def _worst(solution: Solution, flown: Prediction) -> Stretch | None:

@@ -206,11 +206,11 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     pauses on the way is late from there on.
     """
     lines = (predicted, Line.planned(solution))
-    off, start = min(_departure(solution, line, flight) for line in lines)
+    off, start = min(departure(solution, line, flight) for line in lines)
     return start if off <= _ALIKE else None
 
 
-def _departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float]:
+def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float]:
     """Return the departure of `flight` that is most like that of `line`, as `plan_start` has it.
 
     How far it is from it, as a share of the way looked at, and when the clock of `line` read 0.
