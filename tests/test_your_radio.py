@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,14 @@ from faao_mav.fly.radio import Radios
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
+from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import parse_plan, read_plan
+from faao_mav.report.page import render_report
 from faao_mav.schedule.precoder_table import precoder_table
+from faao_mav.workflow import Result
 
 LINK = """
 # fitted to three flights
@@ -95,6 +100,82 @@ def test_algorithm1_keeps_to_the_square_of_the_distance(paper_plan: MakePlan) ->
         optimize(paper_plan({"radio.gain.exponent": 2.5}))
 
 
+SIDE = np.arange(-50.0, 351.0, 20.0)
+MAP: dict[str, Any] = {
+    "east": SIDE,
+    "north": SIDE,
+    "height": np.array([60.0, 100.0]),
+    "gain_db": -90.0 - np.arange(2.0)[:, None, None] - SIDE / 100 + np.zeros((2, 21, 21)),
+}
+ABOVE = {"above_law_db" if key == "gain_db" else key: value for key, value in MAP.items()}
+
+SQUARE = {
+    "optimizer.method": "algorithm1",
+    "radio.gain.exponent": 2,
+    "radio.fading": "none",
+    "radio.causal": False,
+}
+
+
+def mapped(folder: Path, arrays: dict[str, Any], changes: dict[str, Any]) -> Path:
+    """Write a plan and the file of a map beside it."""
+    (folder / "maps").mkdir(exist_ok=True)
+    np.savez(folder / "maps" / "m.npz", **arrays)
+    return written(folder, changes, link="exponent: 2.5\nmap: maps/m.npz\n")
+
+
+def test_a_map_stands_in_the_text_of_a_plan(tmp_path: Path) -> None:
+    """Of one hop, by way of a law's file, and with a result that is saved."""
+    changes = {"flight.altitude": 70, "radio.ground_user.gain": {"map": "maps/m.npz"}}
+    plan = read_plan(mapped(tmp_path, MAP, changes))
+    assert plan.mapped == ((-50.0, -50.0), (350.0, 350.0))
+    assert parse_plan(plan.text).radio == plan.radio  # without the file
+    assert plan.changed({"flight.start": [40, 1]}).radio == plan.radio
+    problem = build_problem(plan)
+    assert problem.bs_uav.gains.above is None
+    gains = problem.uav_user.gains.gain(np.array([[100.0], [30.0]]))
+    assert 10 * np.log10(gains) == pytest.approx(-91.25)
+    solution = optimize(plan)
+    save_solution(solution, tmp_path / "r.npz")
+    assert load_solution(tmp_path / "r.npz").problem.plan.radio == plan.radio
+    page = render_report(Result(solution))
+    assert max(map(len, re.findall("npz:.*", page))) < 100
+    law = read_plan(mapped(tmp_path, ABOVE, {"radio.gain": "link.yaml"}))
+    assert law.mapped is None
+    for link in build_problem(law).links:
+        assert link.gains.law.db(np.array([30.0]), 40.0) == pytest.approx(-50 - 25 * np.log10(50))
+        assert link.gains.above is not None
+    with pytest.raises(PlanError, match=r"radio\.gain is not for algorithm1"):
+        optimize(law.changed(SQUARE))
+
+
+@pytest.mark.parametrize(
+    ("arrays", "changes", "told"),
+    [
+        (MAP, {"flight.start": [-60, 0]}, "flight.start: [-60.0, 0.0] is off radio.gain.map: -50"),
+        (MAP, {"flight.end": [0, 400]}, "flight.end: [0.0, 400.0] is off radio.gain.map: -50 to 3"),
+        (MAP, {"radio.gain.exponent": 3}, "radio.gain.exponent: 3.0: radio.gain.map is the gain"),
+        (MAP, {"radio.gain.elevation_db": [1]}, "radio.gain.elevation_db: (1.0,): radio.gain.map"),
+        (MAP, {"radio.gain.reference_gain_db": -40}, "radio.gain.reference_gain_db: -40.0: "),
+        (MAP, {"radio.gain.map": 3}, "radio.gain.map: 3: no map; give the name of a .npz"),
+        (MAP, {"radio.gain.map": "npz:AA"}, "radio.gain.map: not the numbers of a map; expected"),
+        (MAP, {"radio.gain.map": "n.npz"}, "n.npz: cannot be read: No such file"),
+        (MAP | {"gain_db": np.full((2, 21, 21), 3.0)}, {}, "radio.gain.map: 3 dB is more than was"),
+        (MAP | {"gain_db": np.full((2, 21, 21), np.nan)}, {}, "radio.gain.map: no aircraft can be"),
+        (MAP | {"ground": np.full((21, 21), 99.0)}, {}, "no aircraft can be on it at 40 m (flight"),
+        (MAP | {"origin": np.array([47.0, 8.0])}, {}, "maps/m.npz: origin: 47, 8 lies "),
+        (MAP | {"east": SIDE[:9]}, {}, "maps/m.npz: gain_db: 2 x 21 x 21 numbers; expected 2 x 21"),
+    ],
+)
+def test_what_is_wrong_with_a_map_is_told(
+    tmp_path: Path, arrays: dict[str, Any], changes: dict[str, Any], told: str
+) -> None:
+    message = refused(mapped(tmp_path, arrays, {"radio.gain.map": "maps/m.npz"} | changes))
+    assert told in message
+    assert message.startswith(f"{tmp_path / 'plan.yaml'}: ")
+    assert len(message.splitlines()) == 1
+
+
 TABLE = """# two columns count
 mcs, SNR_dB, "mbit_per_s"
 2, 12, 26
@@ -125,7 +206,7 @@ def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("table", "told"),
     [
-        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s, or"),
+        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s or"),
         ("snr,rate\n1,2\n", "line 1: columns 'snr, rate'"),
         ("snr_db,mbit_per_s,bit_per_s_per_hz\n1,2,3\n", "line 1: columns"),
         ("# x\nsnr_db,mbit_per_s\n1,2\n3,fast\n", "line 4: mbit_per_s: 'fast' is no number"),

@@ -29,6 +29,7 @@ from faao_mav.radio.constellation import (
 )
 from faao_mav.radio.gain import GainFunction
 from faao_mav.radio.gain_field import GainField
+from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.rate_steps import StreamRate, one_stream
 from faao_mav.radio.relay import RelayQueue
@@ -302,6 +303,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
     check_size(plan)
     radio, slots = plan.radio, plan.flight.slots
     laws = (parts["gain"],) * 2 if "gain" in parts else radio.path_gains
+    maps = (None,) * 2 if "gain" in parts else tuple(law.map for law in radio.gain_laws)
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
     rng, t = np.random.default_rng(radio.seed), plan.flight.time_step * np.arange(float(slots))
 
@@ -314,6 +316,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
         power: float,
         noise: float,
         law: GainFunction,
+        over: GainMap | None,
     ) -> Link:
         places = station.at(t) if station.moves else np.array(station.position)
         match radio.fading:
@@ -325,7 +328,12 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
                 nlos = None
         return Link(
             name=name,
-            gains=GainField(law, places, plan.flight.altitude),
+            gains=GainField(
+                law,
+                places,
+                plan.flight.altitude,
+                None if over is None else over.at(plan.flight.altitude),
+            ),
             to_relay=to_relay,
             power=power,
             noise=noise,
@@ -351,6 +359,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
             base.power,
             relay.noise,
             laws[0],
+            maps[0],
         ),
         uav_user=link(
             "UAV to ground user",
@@ -361,6 +370,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
             relay.power,
             user.noise,
             laws[1],
+            maps[1],
         ),
         precoder=parts.get("precoder"),
     )

@@ -13,11 +13,11 @@ import numpy as np
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import InputError, quote
 from faao_mav.files import write_whole
-from faao_mav.optimizer.archive import read_archive
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.power import JOULES_PER_WH
+from faao_mav.radio.archive import read_archive
 from faao_mav.radio.relay import Relayed
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
@@ -14,8 +13,10 @@ from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, listed
 from faao_mav.plan.keys import unknown_key, varied_twice
 from faao_mav.plan.model import PlanContents
+from faao_mav.plan.radio import GainLaw
 from faao_mav.plan.sections import Flight, Heights
 from faao_mav.power import RotaryWing
+from faao_mav.radio.gain_map import GainMap
 from faao_mav.vector import chord
 
 MAX_SLOTS = 100_000
@@ -156,15 +157,40 @@ def _gain(plan: PlanContents) -> Iterator[str]:
         if plan.optimizer.method == "algorithm1":
             yield f"{told}algorithm1 (optimizer.method) knows no shadowing; give method direct"
     own = {"base_station": radio.base_station.gain, "ground_user": radio.ground_user.gain}
-    for (law, name), height in product(zip(radio.path_gains, own, strict=True), heights):
-        at = law.best_distance(2 * MAX_LOCAL_DISTANCE, height)
-        gain = float(law.db(np.array(at), height))
-        if gain > 0:
-            key = f"radio.{name}.gain" if own[name] else "radio.gain"
+    for given, law, name in zip(radio.gain_laws, radio.path_gains, own, strict=True):
+        key = f"radio.{name}.gain" if own[name] else "radio.gain"
+        if given.map is not None and all(given.map.barred(height).all() for height in heights):
+            yield f"{key}.map: no aircraft can be on it at {plan.flight.altitude:g} m (flight.altitude)"
+        if given.whole is not None:
+            yield from _whole_map(plan.flight, given, given.whole, key)
+            continue
+        for height in heights:
+            at = law.best_distance(2 * MAX_LOCAL_DISTANCE, height)
+            gain = float(law.db(np.array(at), height))
+            if gain > 0:
+                yield (
+                    f"{key}: {gain:.4g} dB at {math.hypot(at, height):.4g} m is more than was "
+                    "sent; give what the link has, without the power"
+                )
+
+
+def _whole_map(flight: Flight, given: GainLaw, known: GainMap, key: str) -> Iterator[str]:
+    """Yield what is wrong with a map that is the gain itself."""
+    for name, default in {"reference_gain_db": None, "exponent": 2.0, "elevation_db": ()}.items():
+        if (value := getattr(given, name)) != default:
             yield (
-                f"{key}: {gain:.4g} dB at {math.hypot(at, height):.4g} m is more than was sent; "
-                "give what the link has, without the power"
+                f"{key}.{name}: {quote(value)}: {key}.map is the gain itself; leave {name} out, or "
+                "give a map above the law (above_law_db)"
             )
+    if (most := float(np.nanmax(known.db))) > 0:
+        yield f"{key}.map: {most:.4g} dB is more than was sent; give the gain without the power"
+    for end, place in (("start", flight.start), ("end", flight.end)):
+        if not known.covers(place):
+            sides = (
+                f"{side[0]:.6g} to {side[-1]:.6g} m {name}"
+                for side, name in ((known.east, "east"), (known.north, "north"))
+            )
+            yield f"flight.{end}: {quote(list(place))} is off {key}.map: {', '.join(sides)}"
 
 
 def _steps(flight: Flight) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
@@ -90,7 +90,7 @@ def _below(section: type, prefix: str) -> Iterator[PlanKey]:
 
 def _sections(annotation: Any) -> Iterator[Any]:
     """Yield the sections that a field of this type holds."""
-    if isinstance(annotation, type) and is_dataclass(annotation):
+    if hasattr(annotation, "__pydantic_config__"):
         yield annotation
     for part in get_args(annotation):
         yield from _sections(part)

@@ -145,6 +145,19 @@ class PlanContents(PlanFile):
             return None
         return _free_area(self.zones, self.any_inclusion)
 
+    @property
+    def mapped(self) -> tuple[Vector, Vector] | None:
+        """The rectangle where the gains are known, [east, north] m of two corners, the lower first.
+
+        None where they are known everywhere; it is empty where maps lie apart.
+        """
+        known = [law.whole for law in self.radio.gain_laws if law.whole]
+        if not known:
+            return None
+        east, north = [each.east for each in known], [each.north for each in known]
+        low = max(float(x[0]) for x in east), max(float(y[0]) for y in north)
+        return low, (min(float(x[-1]) for x in east), min(float(y[-1]) for y in north))
+
     def megabits(self, rate: float) -> float | None:
         """Return `rate`, bit/s/Hz, in Mbit/s; None without `radio.bandwidth_mhz`."""
         bandwidth = self.radio.bandwidth_mhz

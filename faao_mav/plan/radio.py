@@ -1,10 +1,11 @@
 """What the plan says of both links: `radio`."""
 
 from dataclasses import field
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, PlainValidator, ValidationInfo
 
+from faao_mav.errors import InputError
 from faao_mav.plan.fields import (
     Antennas,
     Flag,
@@ -17,10 +18,13 @@ from faao_mav.plan.fields import (
     key,
     linear,
     section,
+    told,
     watts,
 )
 from faao_mav.plan.station import Station
 from faao_mav.radio.gain import PathGain
+from faao_mav.radio.gain_map import GainMap
+from faao_mav.radio.map_file import WORD, map_of_word
 from faao_mav.radio.rate_steps import RateSteps
 
 Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
@@ -34,6 +38,18 @@ _Angle: TypeAlias = Annotated[Number, Field(ge=0, le=90)]
 _Distance: TypeAlias = Annotated[Number, Field(gt=0)]
 
 _POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
+
+
+def _map(value: object, info: ValidationInfo) -> GainMap:
+    """Return the map that a plan's text holds, about the origin of the plan."""
+    context: Any = info.context
+    if not (isinstance(value, str) and value.startswith(WORD)):
+        raise ValueError("no map")
+    origin = (*context["origin"], context["elevation"]) if "origin" in context else None
+    try:
+        return map_of_word(value, origin)
+    except InputError as error:
+        raise told(str(error)) from None
 
 
 def _in_order(ends: tuple[float, float]) -> tuple[float, float]:
@@ -74,7 +90,17 @@ class GainLaw:
         "two numbers [least, most] above 0",
         default=None,
     )
+    map: Annotated[GainMap, PlainValidator(_map)] | None = key(
+        "Gain over the map, in dB, or what it is above the law; null: the law alone.",
+        accepted="the name of a .npz, .csv, .tif or .tiff",
+        default=None,
+    )
     about: Text = key("What it was found from.", accepted="one line of text", default="")
+
+    @property
+    def whole(self) -> GainMap | None:
+        """The map where it is the gain itself, without a law; None otherwise."""
+        return None if self.map is None or self.map.above_law else self.map
 
 
 @section
@@ -90,7 +116,7 @@ class RadioRates:
     )
 
 
-_GAIN_FILE = "a mapping with reference_gain_db, exponent, elevation_db, or the name of a file"
+_GAIN_FILE = "a mapping with reference_gain_db, exponent, elevation_db, map, or the name of a file"
 
 
 @section
@@ -210,9 +236,11 @@ class Radio:
 
     @property
     def path_gains(self) -> tuple[PathGain, PathGain]:
-        """The path gain of each hop."""
+        """The law of each hop's path gain: 0 dB under a map of the gain itself."""
         first, second = (
-            PathGain(
+            PathGain(1.0, exponent=0.0)
+            if law.whole
+            else PathGain(
                 self.reference_gain
                 if law.reference_gain_db is None
                 else linear(law.reference_gain_db),

@@ -22,6 +22,8 @@ from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.plan.model import PlanContents, PlanFile
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
 from faao_mav.plan.zones import CHOICES
+from faao_mav.radio.gain_map import GainMap
+from faao_mav.radio.map_file import MAX_WORD, map_word
 
 _MAX_LINES = 6
 """Lines of a message; chosen to fit a small terminal."""
@@ -108,7 +110,7 @@ def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
     >>> plan.flight.start, plan.flight.duration, plan.radio.modulation
     ((0.0, 350.0), 120.0, 'qpsk')
     """
-    text = read_text(path, 4 * MAX_CHARACTERS, "a plan", PlanError)
+    text = read_text(path, 4 * MAX_CHARACTERS + 2 * MAX_WORD, "a plan", PlanError)
     return parse_plan(text, str(path), method=method)
 
 
@@ -151,6 +153,8 @@ def _plain(value: Any, source: str) -> Any:
             return value
         case Path():
             return str(value)
+        case GainMap():
+            return map_word(value)
     raise PlanError(f"{source}: {quote(value)} is not accepted; give numbers, text or lists")
 
 

@@ -59,6 +59,7 @@ def _keep(origin: Origin, info: ValidationInfo) -> Origin:
         raise told(str(error)) from None
     context: Any = info.context
     context["origin"] = (origin.latitude, origin.longitude)
+    context["elevation"] = origin.elevation
     return origin
 
 

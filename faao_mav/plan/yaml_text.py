@@ -4,9 +4,11 @@
 error. What plans have no use for is refused before it is built: anchors' aliases, tags, nesting.
 """
 
+import hashlib
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, ClassVar
 
 from ruamel.yaml import YAML
@@ -20,6 +22,7 @@ from ruamel.yaml.resolver import VersionedResolver
 
 from faao_mav.errors import PlanError, shortened
 from faao_mav.mission.fence import MAX_CORNERS
+from faao_mav.radio.map_file import WORD
 
 MAX_CHARACTERS = 80 * MAX_CORNERS
 """Characters of the longest plan that is read: a corner of the fence, written in degrees with all
@@ -37,6 +40,12 @@ _MAX_PROBLEM = 200
 
 _MAX_WIDTH = 4096
 """Characters of a line at which long values are folded when written; chosen."""
+
+_LONG_WORD = re.compile(rf"{WORD}[A-Za-z0-9+/=]{{100,}}")
+"""A word such as a map's, which does not go through YAML: that takes a microsecond a character."""
+
+_STAND_IN = re.compile(r"long-word-[0-9a-f]{64}")
+"""What stands for it there, by its SHA-256."""
 
 _CORE_SCHEMA = {
     "null": r"~|null|Null|NULL|",
@@ -132,13 +141,47 @@ def dump_yaml(data: Mapping[str, Any]) -> str:
       - 0
       - 1.5
     """
+    long: dict[str, str] = {}
     yaml = _yaml()
     yaml.default_flow_style = yaml.allow_unicode = False
     yaml.sort_base_mapping_type_on_output = False
     yaml.width = _MAX_WIDTH
     text = io.StringIO()
-    yaml.dump(data, text)
-    return text.getvalue()
+    yaml.dump(_with_words(data, partial(_without_words, long)), text)
+    return _words_of(long, text.getvalue())
+
+
+def shown(text: str) -> str:
+    """Return a plan's `text` for people, its long words cut short."""
+    return _LONG_WORD.sub(lambda found: shortened(found[0]), text)
+
+
+def _without_words(long: dict[str, str], text: str) -> str:
+    """Return `text` with stand-ins for its long words, which are kept in `long`."""
+
+    def stand_in(found: re.Match[str]) -> str:
+        name = f"long-word-{hashlib.sha256(found[0].encode()).hexdigest()}"
+        long[name] = found[0]
+        return name
+
+    return _LONG_WORD.sub(stand_in, text)
+
+
+def _words_of(long: dict[str, str], text: str) -> str:
+    """Return `text` with its long words in their places again."""
+    return _STAND_IN.sub(lambda found: long.get(found[0], found[0]), text) if long else text
+
+
+def _with_words(value: Any, change: Callable[[str], str]) -> Any:
+    """Return the data `value` with its words changed."""
+    match value:
+        case dict():
+            return {key: _with_words(inside, change) for key, inside in value.items()}
+        case list():
+            return [_with_words(inside, change) for inside in value]
+        case str():
+            return change(value)
+    return value
 
 
 def load_yaml(text: str, source: str) -> dict[str, Any]:
@@ -152,6 +195,8 @@ def load_yaml(text: str, source: str) -> dict[str, Any]:
     """
     if text.startswith("QGC WPL") or (text.lstrip()[:1] == "{" and '"fileType"' in text):
         raise PlanError(f"{source}: a mission, not a plan; faao-mission validate takes missions")
+    long: dict[str, str] = {}
+    text = _without_words(long, text)
     if len(text) > MAX_CHARACTERS:
         raise PlanError(
             f"{source}: {len(text):,} characters; a plan has at most {MAX_CHARACTERS:,}"
@@ -175,4 +220,4 @@ def load_yaml(text: str, source: str) -> dict[str, Any]:
         raise PlanError(
             f"{source}: a plan is a mapping of sections (site, flight, ...), not {found}"
         )
-    return data
+    return {key: _with_words(inside, partial(_words_of, long)) for key, inside in data.items()}

@@ -5,25 +5,34 @@ bilinear, between its heights linear: so flights are priced. The optimiser has t
 through the grid smoothed over a cell: slopes that it can follow, and no edge that it does not see.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.spline import Spline
 
 _KERNEL = np.array([0.25, 0.5, 0.25])
 """Weights of a point of the grid and its neighbours when a map is smoothed, along each side."""
+
+_FARTHEST = 10_000.0
+"""Metres between a map's own origin and the plan's at most: the meridians of both are parallel
+within 3e-3 up to 60 degrees of latitude, 3 m at a kilometre from the middle of the map."""
 
 
 @dataclass(frozen=True, eq=False)
 class GainMap:
     """dB over the map: `db` (j, m, k) at `heights` (j,), `north` (m,) and `east` (k,), m.
 
-    Places and heights count from the origin of the plan, `heights` rise, both sides have even
-    steps. With `above_law` the `db` are above a law, and 0 off the map; otherwise they are the
-    gain, which is known on the map alone. NaN is where no aircraft can be, as below ground;
-    `ground` (m, k) is how high ground and what stands on it are, m, where the map tells it.
+    Places and heights count from the origin of the plan, or from the map's own `origin`, where it
+    has one: latitude and longitude, degrees, and, for the heights, m above mean sea level.
+    `heights` rise, both sides have even steps. With `above_law` the `db` are above a law, and 0 off
+    the map; otherwise they are the gain, which is known on the map alone. NaN is where no aircraft
+    can be, as below ground; `ground` (m, k) is how high ground and what stands on it are, m, where
+    the map tells it.
     """
 
     east: Real
@@ -32,6 +41,39 @@ class GainMap:
     db: Real
     above_law: bool = False
     ground: Real | None = None
+    origin: tuple[float, ...] = ()
+
+    def about(self, latitude: float, longitude: float, elevation: float) -> "GainMap":
+        """Return the map with places and heights from another origin, where it has its own.
+
+        It is moved as a whole, its middle to where that is. Raises `InputError` for an origin that
+        is too far off.
+        """
+        if not self.origin:
+            return self
+        frame, own = LocalFrame(latitude, longitude), LocalFrame(*self.origin[:2])
+        away = float(np.hypot(*frame.to_local(*self.origin[:2])))
+        if away > _FARTHEST:
+            raise InputError(
+                f"origin: {', '.join(f'{x:.7g}' for x in self.origin)} lies {away / 1000:,.1f} km "
+                f"from site.origin; expected at most {_FARTHEST / 1000:g} km"
+            )
+        middle = np.array([self.east[[0, -1]].mean(), self.north[[0, -1]].mean()])
+        east, north = frame.to_local(*own.to_geodetic(middle)) - middle
+        up = sum(self.origin[2:]) - elevation if self.origin[2:] else 0.0
+        return replace(
+            self,
+            east=self.east + east,
+            north=self.north + north,
+            heights=self.heights + up,
+            ground=None if self.ground is None else self.ground + up,
+            origin=(),
+        )
+
+    def covers(self, place: Sequence[float]) -> bool:
+        """Return whether a place [east, north], m, is on the map."""
+        sides = zip(place, (self.east, self.north), strict=True)
+        return all(side[0] <= x <= side[-1] for x, side in sides)
 
     def at(self, height: float) -> "Grid":
         """Return the map at a `height`, m; at the nearest of its own where that is beyond them.

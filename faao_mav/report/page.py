@@ -7,6 +7,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from faao_mav.plan.yaml_text import shown
 from faao_mav.report.debrief import FromLog
 from faao_mav.report.style import inline_svg
 from faao_mav.report.summary import Line, check_lines, result_lines
@@ -88,7 +89,7 @@ def _sections(about: Result | Check | FromLog) -> Iterator[str]:
             ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
             head = ("start", f"{solution.plan.radio.maximised}, bit/s/Hz")
             yield section("Starts", _table(head, [(name, f"{rate:.4f}") for name, rate in ranked]))
-        yield section("Plan", f"<pre>{escape(solution.plan.text)}</pre>", "wide text")
+        yield section("Plan", f"<pre>{escape(shown(solution.plan.text))}</pre>", "wide text")
 
 
 def _figures(

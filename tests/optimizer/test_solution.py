@@ -13,10 +13,10 @@ from certificate import still_gained
 from conftest import MakePlan, contents
 
 from faao_mav.errors import InputError
-from faao_mav.optimizer import archive
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import SATURATED, price, saturation
 from faao_mav.optimizer.solution import Solution, load_solution, save_solution
+from faao_mav.radio import archive
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def _check_plan(problem: Problem) -> None:
             "its sums are those of the cutoff rate",
         ),
         (
-            any(not link.gains.law.square for link in problem.links),
+            any(link.gains.above or not link.gains.law.square for link in problem.links),
             "radio.gain",
             "its Proposition 1 is of a gain that falls by the square of the distance",
         ),

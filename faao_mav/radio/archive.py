@@ -28,32 +28,41 @@ _LARGE = 20
 """Bytes of the record before it in an archive of more than 4 GB, which begins with `PK 6 7`."""
 
 
-def read_archive(path: str | Path, names: Sequence[str]) -> dict[str, "np.ndarray[Any, Any]"]:
+def read_archive(
+    path: str | Path, names: Sequence[str], what: str = "a result of faao-mission --save"
+) -> dict[str, "np.ndarray[Any, Any]"]:
     """Return those of the arrays `names` that the archive `path` has, as they are there.
 
     Raises `InputError` if it is no archive, if an array is none of numbers or text, and for more
-    than `MAX_BYTES`.
+    than `MAX_BYTES`; `what` says what was expected.
     """
-    arrays, left = {}, MAX_BYTES
     with opened(path) as file:
         try:
-            _check_directory(file)
-            with zipfile.ZipFile(file) as archive:
-                for name in {f"{each}.npy" for each in names}.intersection(archive.namelist()):
-                    left -= archive.getinfo(name).file_size  # no more is unpacked of it
-                    if left < 0:
-                        break
-                    with archive.open(name) as member:
-                        array = np.lib.format.read_array(member, allow_pickle=False)
-                        arrays[name.removesuffix(".npy")] = array
+            arrays = unpacked(file, names)
         except OSError:  # `opened` tells it
             raise
         except Exception as error:  # zipfile and NumPy raise a dozen kinds for what is broken
-            raise InputError(f"{path}: not a result of faao-mission --save") from error
-    if left < 0:
-        raise InputError(
-            f"{path}: more than {MAX_BYTES:,} bytes; expected a result of faao-mission --save"
-        )
+            raise InputError(f"{path}: not {what}") from error
+    if arrays is None:
+        raise InputError(f"{path}: more than {MAX_BYTES:,} bytes; expected {what}")
+    return arrays
+
+
+def unpacked(file: BinaryIO, names: Sequence[str]) -> dict[str, "np.ndarray[Any, Any]"] | None:
+    """Return those of the arrays `names` that the archive in `file` has; None for too many bytes.
+
+    Raises an exception of any kind for anything else.
+    """
+    arrays, left = {}, MAX_BYTES
+    _check_directory(file)
+    with zipfile.ZipFile(file) as archive:
+        for name in {f"{each}.npy" for each in names}.intersection(archive.namelist()):
+            left -= archive.getinfo(name).file_size  # no more is unpacked of it
+            if left < 0:
+                return None
+            with archive.open(name) as member:
+                array = np.lib.format.read_array(member, allow_pickle=False)
+                arrays[name.removesuffix(".npy")] = array
     return arrays
 
 

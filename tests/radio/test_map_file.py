@@ -1,0 +1,213 @@
+"""Files of gain maps: what is read back, and what is refused."""
+
+import base64
+import io
+import itertools
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from faao_mav.arrays import Real
+from faao_mav.errors import InputError
+from faao_mav.geodesy import LocalFrame
+from faao_mav.radio import archive
+from faao_mav.radio.gain_map import GainMap
+from faao_mav.radio.map_file import WORD, map_archive, map_of_word, map_word, read_map
+
+EAST, NORTH = np.arange(0.0, 50.0, 10.0), np.arange(-20.0, 60.0, 20.0)
+SOUND: dict[str, Any] = {"east": EAST, "north": NORTH, "gain_db": np.full((4, 5), -90.0)}
+
+
+@st.composite
+def maps(draw: st.DrawFn) -> GainMap:
+    """Any map that a file may hold."""
+    shape = draw(st.tuples(st.integers(1, 3), st.integers(2, 5), st.integers(2, 5)))
+    place, step = st.floats(-5e4, 5e4), st.floats(0.01, 1e3)
+    north, east = (np.arange(float(n)) * draw(step) + draw(place) for n in shape[1:])
+    heights = np.cumsum(draw(arrays.arrays(float, shape[0], elements=st.floats(1, 500))))
+    db = draw(arrays.arrays(float, shape, elements=st.floats(-300, 100) | st.just(np.nan)))
+    up = arrays.arrays(float, shape[1:], elements=st.floats(-400, 9000))
+    ground = draw(st.none() | up)
+    degrees = st.tuples(st.floats(-89, 89), st.floats(-180, 180))
+    origin = draw(st.just(()) | degrees | st.tuples(*[st.floats(-80, 80)] * 2, st.floats(0, 9000)))
+    return GainMap(east, north, heights, db, draw(st.booleans()), ground, origin)
+
+
+def same(a: GainMap, b: GainMap, off: float) -> None:
+    """Assert that both maps are one, dB and ground within `off`."""
+    for name in ("east", "north", "heights"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-12, atol=2e-6)
+    np.testing.assert_allclose(a.db, b.db, rtol=0, atol=off)
+    assert (a.above_law, a.origin) == (b.above_law, b.origin)
+    assert (a.ground is None) == (b.ground is None)
+    if a.ground is not None and b.ground is not None:
+        np.testing.assert_allclose(a.ground, b.ground, rtol=0, atol=off)
+
+
+def table(found: GainMap) -> str:
+    """The rows of a map, the last first."""
+    kind = "above_law_db" if found.above_law else "gain_db"
+    rows = []
+    points = itertools.product(*map(enumerate, (found.heights, found.north, found.east)))
+    for (j, up), (m, y), (k, x) in points:
+        ground = f",{found.ground[m, k]}" if found.ground is not None else ""
+        rows.append(f"{found.db[j, m, k]},{x:.9f},{up},{y:.9f}{ground}")
+    header = f"{kind},East_m,height_m,north_m" + (",ground_m" if found.ground is not None else "")
+    return "\n".join(["# by hand", header, *rows[::-1], ""])
+
+
+@given(maps())
+def test_maps_are_read_back(tmp_path_factory: pytest.TempPathFactory, found: GainMap) -> None:
+    folder = tmp_path_factory.mktemp("maps")
+    (folder / "a.npz").write_bytes(map_archive(found))
+    same(read_map(folder / "a.npz"), found, 0.0)
+    same(map_of_word(map_word(found)), found, 0.0051)
+    word = map_word(map_of_word(map_word(found)))
+    assert map_word(map_of_word(word)) == word
+    if not found.origin:
+        (folder / "a.csv").write_text(table(found))
+        same(read_map(folder / "a.csv"), found, 1e-9)
+
+
+def test_a_map_with_an_origin_of_its_own_is_moved_as_a_whole() -> None:
+    """Places on it stay where they are on the globe, within the turn of the meridians."""
+    own, plan = (47.03, 8.01, 500.0), (47.0, 8.0, 450.0)
+    ground = np.full((4, 5), 3.0)
+    found = GainMap(EAST, NORTH, np.array([60.0]), np.zeros((1, 4, 5)), False, ground, own)
+    moved = found.about(*plan)
+    assert (moved.heights.tolist(), moved.origin) == ([110.0], ())
+    assert moved.ground is not None
+    assert float(moved.ground[0, 0]) == 53.0
+    for i, j in ((0, 0), (-1, -1), (0, -1)):
+        before = LocalFrame(*own[:2]).to_geodetic(np.array([EAST[i], NORTH[j]]))
+        after = LocalFrame(*plan[:2]).to_geodetic(np.array([moved.east[i], moved.north[j]]))
+        np.testing.assert_allclose(after, before, rtol=0, atol=1e-7)
+    assert found.about(47.0, 8.0, 500.0).heights[0] == 60.0
+    with pytest.raises(InputError, match=r"origin: 47\.03, 8\.01, 500 lies 11\.\d km"):
+        found.about(47.13, 8.0, 450.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"east": None}, "east: missing; expected a map of east, north, height and gain_db"),
+        ({"gain_db": None}, "gain_db or above_law_db: missing; expected one of them"),
+        ({"above_law_db": np.zeros((4, 5))}, "gain_db or above_law_db: both are given"),
+        ({"gain_db": np.zeros((5, 4))}, "gain_db: 1 x 5 x 4 numbers; expected 1 x 4 x 5, heights"),
+        ({"gain_db": np.zeros((2, 4, 5))}, "height: missing; expected one for each of gain_db"),
+        ({"gain_db": np.full((4, 5), np.inf)}, "gain_db: inf; expected -300 to 100 dB, NaN where"),
+        ({"gain_db": np.full((4, 5), -3e9)}, r"gain_db: -3e\+09; expected"),
+        ({"gain_db": np.full((4, 5), "-90")}, "gain_db: <U3; expected numbers"),
+        ({"gain_db": np.full((4, 5), 1j)}, "gain_db: complex128; expected numbers"),
+        ({"gain_db": np.float64(3)}, "gain_db: .*numbers; expected"),
+        ({"gain_db": np.zeros((1001, 1000))}, "gain_db: 1,001,000 numbers; expected at most 1,000"),
+        ({"east": np.array([0, 10, 20, 31, 40.0])}, "east: 31; expected even steps, which are 10"),
+        ({"east": EAST[::-1]}, "east: 30 after 40; expected metres that rise"),
+        ({"east": EAST[:1]}, "east: 1 numbers; expected a list of at least 2"),
+        ({"east": np.where(EAST == 20, np.nan, EAST)}, "east: nan; expected -100000 to 100000 m"),
+        ({"north": np.zeros((2, 2))}, "north: 2 x 2 numbers; expected a list"),
+        ({"height": np.array([60.0, 60.0])}, "height: 60 after 60; expected metres that rise"),
+        ({"height": np.array([60.0, 80.0])}, "gain_db: 1 x 4 x 5 numbers; expected 2 x 4 x 5"),
+        ({"ground": np.zeros((2, 2))}, "ground: 2 x 2 numbers; expected 4 x 5, north, east"),
+        ({"ground": np.full((4, 5), np.nan)}, "ground: nan; expected"),
+        ({"origin": np.array([91.0, 0.0])}, "origin: .*expected latitude and longitude, degrees"),
+        ({"origin": np.zeros(4)}, "origin: .*expected latitude and longitude"),
+        ({"gain_db": np.array([{}], dtype=object)}, "not a map of east, north"),
+    ],
+)  # fmt: skip
+def test_arrays_that_are_no_map_are_refused(
+    tmp_path: Path, changes: dict[str, Any], told: str
+) -> None:
+    path = tmp_path / "a.npz"
+    kept: dict[str, Any] = {k: v for k, v in (SOUND | changes).items() if v is not None}
+    np.savez(path, **kept)
+    with pytest.raises(InputError, match=f"a.npz: {told}"):
+        read_map(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "line 1: columns ''; give a header with east_m and north_m and gain_db or above"),
+        ("east_m,north_m\n0,0\n", "line 1: columns 'east_m, north_m'"),
+        ("east_m,north_m,gain_db\n0,0,x\n", "line 2: gain_db: 'x' is no number"),
+        ("east_m,north_m,gain_db\n0,,-9\n", "line 2: north_m: '' is no number"),
+        ("east_m,north_m,gain_db\n0,inf,-9\n", "line 2: north_m: inf; expected metres"),
+        ("east_m,north_m,gain_db\n0,0,-9\n0,9,-9\n9,9,-9\n", "no row at .*north 0, east 9"),
+        ("east_m,north_m,gain_db\n0,0,-9\n#\n9,9,-9\n0,0,-8\n", "line 5: the place of line 2"),
+        ("east_m,north_m,gain_db\n0,0,-9\n0,9,-9\n9,9,-9\n9,0,inf\n", "gain_db: inf; expected"),
+        ("east_m,north_m,gain_db\n0,0,-9\n0,9,-9\n", "east: 1 numbers; expected a list"),
+        ("east_m,north_m,height_m,gain_db,ground_m\n"
+         + "".join(f"{x},{y},{z},-9,{z}\n" for x in (0, 9) for y in (0, 9) for z in (50, 60)),
+         "ground_m: differs between heights; expected one at a place"),
+    ],
+)  # fmt: skip
+def test_tables_that_are_no_map_are_refused(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=f"a.csv: {told}"):
+        read_map(path)
+
+
+def test_files_that_are_no_archive_or_of_any_size_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, told in (("a.npz", "not a map"), ("a.tif", "cannot be read"), ("a.json", "ends in")):
+        if name.endswith("tif"):
+            pytest.importorskip("rasterio")
+        (tmp_path / name).write_bytes(b"PK\3\4 nothing")
+        with pytest.raises(InputError, match=f"{name}: .*{told}"):
+            read_map(tmp_path / name)
+    with pytest.raises(InputError, match=r"none\.npz: cannot be read"):
+        read_map(tmp_path / "none.npz")
+    monkeypatch.setattr(archive, "MAX_BYTES", 1_000_000)
+    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as packed:
+        packed.writestr("gain_db.npy", bytes(2_000_000))
+    with pytest.raises(InputError, match=r"bomb\.npz: more than 1,000,000 bytes"):
+        read_map(tmp_path / "bomb.npz")
+
+
+def test_words_that_are_no_map_are_refused() -> None:
+    buffer = io.BytesIO()
+    np.savez(buffer, **SOUND)  # dB as they are in files, not as in words
+    words = [WORD, WORD + "AAAA", WORD + "ä", map_word(GainMap(EAST, NORTH, *rest()))[:-40]]
+    words.append(WORD + base64.b64encode(buffer.getvalue()).decode())
+    for word in words:
+        with pytest.raises(InputError, match=r"not the numbers of a map|missing"):
+            map_of_word(word)
+
+
+def rest() -> tuple[Real, Real]:
+    return np.array([60.0]), np.zeros((1, 4, 5))
+
+
+def test_a_geotiff_of_any_projection_becomes_a_local_grid(tmp_path: Path) -> None:
+    """Of a plane over the globe, in degrees and in metres of UTM, every point is where it was."""
+    rasterio: Any = pytest.importorskip("rasterio")
+    from pyproj import Transformer
+
+    for crs, corner, step in (
+        ("EPSG:4326", (8.0, 47.01), 1e-4),
+        ("EPSG:32632", (424e3, 5207e3), 9),
+    ):
+        to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
+        x, y = np.meshgrid(
+            corner[0] + step * (np.arange(90) + 0.5), corner[1] - step * (np.arange(80) + 0.5)
+        )
+        longitude, latitude = to_degrees.transform(x, y)
+        db = -90.0 + 1e3 * (latitude - 47.0) - 500 * (longitude - 8.0)
+        db[3, 4] = -9999
+        path = tmp_path / "a.tif"
+        told = {"count": 1, "dtype": "float64", "crs": crs, "nodata": -9999}
+        told["transform"] = rasterio.Affine(step, 0, corner[0], 0, -step, corner[1])
+        told |= {"count": 2, "crs": None}
+    with rasterio.open(path, "w", driver="GTiff", width=9, height=8, **told) as file:
+        file.write(np.zeros((2, 8, 9)))
+    with pytest.raises(InputError, match=r"a\.tif: 2 bands, 9 x 8 cells, no coordinates; expected"):
+        read_map(path)
