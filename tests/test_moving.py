@@ -87,10 +87,7 @@ def test_any_text_is_a_track_or_told_in_a_line(text: str) -> None:
         (f"{HEAD}0,1,2\n20,1\n", "line 3: north_m: '' is no number"),
         ("time_s,latitude,longitude\n0,-35.36,149.16\n20,149.16,-35.36\n", "line 3: latitude 149"),
         ("time_s,latitude,longitude\n0,-35.36,149.16\n20,35.36,149.16\n", "line 3: latitude 35"),
-        (
-            "time,lat,lon\n0,1,2\n",
-            "line 1: columns 'time, lat, lon'; give a header with time_s and",
-        ),
+        ("time,lat,lon\n0,1,2\n", "line 1: columns 'time, lat, lon'; give a header with time_s, "),
         (HEAD + "".join(f"{t},0,0\n" for t in range(MAX_POINTS + 1)), "5,001 points with a time"),
         (f"{HEAD}7,0,0\n16,9,0\n", "ends 9 s after it begins, and flight.duration is 10 s"),
         ("convoy.txt", "convoy.txt: cannot be read"),

@@ -157,6 +157,7 @@ def test_a_map_stands_in_the_text_of_a_plan(tmp_path: Path) -> None:
         (MAP, {"radio.gain.exponent": 3}, "radio.gain.exponent: 3.0: radio.gain.map is the gain"),
         (MAP, {"radio.gain.elevation_db": [1]}, "radio.gain.elevation_db: (1.0,): radio.gain.map"),
         (MAP, {"radio.gain.reference_gain_db": -40}, "radio.gain.reference_gain_db: -40.0: "),
+        (MAP, {"radio.ground_user.velocity": [1, 0]}, "radio.ground_user: moves, and radio.gain.m"),
         (MAP, {"radio.gain.map": 3}, "radio.gain.map: 3: no map; give the name of a .npz"),
         (MAP, {"radio.gain.map": "npz:AA"}, "radio.gain.map: not the numbers of a map; expected"),
         (MAP, {"radio.gain.map": "n.npz"}, "n.npz: cannot be read: No such file"),
@@ -206,7 +207,7 @@ def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("table", "told"),
     [
-        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s or"),
+        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s, or"),
         ("snr,rate\n1,2\n", "line 1: columns 'snr, rate'"),
         ("snr_db,mbit_per_s,bit_per_s_per_hz\n1,2,3\n", "line 1: columns"),
         ("# x\nsnr_db,mbit_per_s\n1,2\n3,fast\n", "line 4: mbit_per_s: 'fast' is no number"),

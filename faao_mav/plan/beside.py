@@ -9,17 +9,22 @@ from faao_mav.errors import InputError, PlanError
 from faao_mav.files import read_text
 from faao_mav.plan.station import read_track
 from faao_mav.plan.yaml_text import load_yaml
+from faao_mav.radio.columns import read_columns
 from faao_mav.radio.map_file import WORD, map_word, read_map
-from faao_mav.radio.table import read_columns
 
 MAX_CHARACTERS = 1_000_000
 """Characters of the longest file that is read; chosen: a law of the gain has 500."""
 
+_RATES = (("snr_db", "mbit_per_s"), ("snr_db", "bit_per_s_per_hz"))
+"""The columns of a table of rates."""
+
 
 def read_rates(text: str, path: str) -> dict[str, list[float]]:
-    """Return the columns of a table of rates, as `read_columns` reads them."""
-    columns = read_columns(text, path, [["snr_db"], ["mbit_per_s", "bit_per_s_per_hz"]])[1]
-    return {name: column.tolist() for name, column in columns.items()}
+    """Return the columns of a table of rates; raise `PlanError` that names line and value."""
+    try:
+        return read_columns(text, _RATES)[1]
+    except InputError as error:
+        raise PlanError(f"{path}: {error}") from None
 
 
 _FILES = (

@@ -156,11 +156,14 @@ def _gain(plan: PlanContents) -> Iterator[str]:
             yield f"{told}how far gains are off their law is missing; give radio.gain.spread_db"
         if plan.optimizer.method == "algorithm1":
             yield f"{told}algorithm1 (optimizer.method) knows no shadowing; give method direct"
-    own = {"base_station": radio.base_station.gain, "ground_user": radio.ground_user.gain}
-    for given, law, name in zip(radio.gain_laws, radio.path_gains, own, strict=True):
-        key = f"radio.{name}.gain" if own[name] else "radio.gain"
+    stations = {"base_station": radio.base_station, "ground_user": radio.ground_user}
+    hops = zip(stations.items(), radio.gain_laws, radio.path_gains, strict=True)
+    for (name, station), given, law in hops:
+        key = "radio.gain" if given is radio.gain else f"radio.{name}.gain"
+        if given.map is not None and station.moves:
+            yield f"radio.{name}: moves, and {key}.map is of a station that stands; leave one out"
         if given.map is not None and all(given.map.barred(height).all() for height in heights):
-            yield f"{key}.map: no aircraft can be on it at {plan.flight.altitude:g} m (flight.altitude)"
+            yield f"{key}.map: no aircraft can be on it at {heights[-1]:g} m (flight.altitude)"
         if given.whole is not None:
             yield from _whole_map(plan.flight, given, given.whole, key)
             continue

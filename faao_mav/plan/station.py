@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, MissionFileError, PlanError, quote
 from faao_mav.plan.fields import PLACE, Written, key, read_pair, read_position, section, told
-from faao_mav.radio.table import read_columns
+from faao_mav.radio.columns import read_columns
 from faao_mav.vector import Vector
 
 MAX_POINTS = 5_000
@@ -42,35 +42,20 @@ def read_track(text: str, path: str) -> str:
     """Return the track in the `text` of the file `path`, .csv or .gpx, as the plan has it.
 
     That is a table with `time_s`, s after the first point, and its place in two more columns.
-    Raises `PlanError` that names line or point for what is no track.
+    Raises `InputError` that names line or point for what is no track.
     """
-    names, points = [*_GLOBAL], []
-    if path.lower().endswith(".gpx"):
-        try:
-            points = _gpx_points(text)
-        except PlanError as error:
-            raise PlanError(f"{path}: {error}") from None
-    else:
-        held = _columns(text, path)[1]
-        names, points = [*held], list(zip(*held.values(), strict=True))
+    try:
+        if path.lower().endswith(".gpx"):
+            names, points = [*_GLOBAL], _gpx_points(text)
+        else:
+            lines, held = read_columns(text, (_LOCAL, _GLOBAL))
+            _check_times(lines, held["time_s"])
+            names, points = [*held], list(zip(*held.values(), strict=True))
+    except InputError as error:
+        raise PlanError(f"{path}: {error}") from None
     first = points[0][0]
     rows = (f"{t - first:.11g},{x:.11g},{y:.11g}" for t, x, y in points)
     return "\n".join([",".join(names), *rows, ""])
-
-
-def _columns(text: str, path: str) -> tuple[list[int], dict[str, list[float]]]:
-    """Return the lines of the rows of a track's table, and its columns. Raises `InputError`."""
-    groups = (("time_s",), ("east_m", "latitude"), ("north_m", "longitude"))
-    lines, held = read_columns(text, path, groups)
-    if tuple(held) not in (_LOCAL, _GLOBAL):
-        wanted = " or ".join(" and ".join(names[1:]) for names in (_LOCAL, _GLOBAL))
-        raise InputError(f"{path}: columns {quote(', '.join(held))}; give {wanted}")
-    columns = {name: column.tolist() for name, column in held.items()}
-    try:
-        _check_times(lines, columns["time_s"])
-    except PlanError as error:
-        raise InputError(f"{path}: {error}") from None
-    return lines, columns
 
 
 def _gpx_points(text: str) -> list[tuple[float, float, float]]:
@@ -117,7 +102,8 @@ def _track(value: object, info: ValidationInfo) -> Track | None:
     if not isinstance(value, str):
         raise ValueError("no file")
     try:
-        lines, held = _columns(value, "its table")
+        lines, held = read_columns(value, (_LOCAL, _GLOBAL))
+        _check_times(lines, held["time_s"])
     except InputError as error:
         raise told(str(error)) from None
     times, *sides = held.values()

@@ -18,9 +18,9 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.errors import InputError, quote
 from faao_mav.files import read_text
 from faao_mav.radio.archive import read_archive, unpacked
+from faao_mav.radio.columns import read_columns
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.raster import read_raster
-from faao_mav.radio.table import read_columns
 
 MAX_VALUES = 1_000_000
 """Numbers of decibels in the largest map: a kilometre square by steps of a metre. Chosen."""
@@ -223,8 +223,12 @@ def _even(values: "np.ndarray[Any, Any]", key: str) -> Real:
 def _table(path: str | Path) -> dict[str, Real]:
     """Return the arrays of a table: a row for each point of the grid, in any order."""
     text = read_text(path, _MAX_CHARACTERS, "a table of a map", InputError)
-    groups = ("east_m",), ("north_m",), (_GAIN, _ABOVE)
-    lines, columns = read_columns(text, path, groups, ("height_m", "ground_m"))
+    choices = tuple(("east_m", "north_m", kind) for kind in (_GAIN, _ABOVE))
+    try:
+        lines, lists = read_columns(text, choices, ("height_m", "ground_m"))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    columns = {name: np.array(values) for name, values in lists.items()}
     if len(lines) > MAX_VALUES:
         raise InputError(f"{path}: {len(lines):,} rows; expected at most {MAX_VALUES:,}")
     sides, numbers = [], []

@@ -134,7 +134,7 @@ def test_arrays_that_are_no_map_are_refused(
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", "line 1: columns ''; give a header with east_m and north_m and gain_db or above"),
+        ("", "line 1: columns ''; give a header with east_m, north_m and gain_db, or"),
         ("east_m,north_m\n0,0\n", "line 1: columns 'east_m, north_m'"),
         ("east_m,north_m,gain_db\n0,0,x\n", "line 2: gain_db: 'x' is no number"),
         ("east_m,north_m,gain_db\n0,,-9\n", "line 2: north_m: '' is no number"),
