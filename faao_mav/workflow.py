@@ -39,6 +39,7 @@ from faao_mav.schedule.conversion import Conversion, beyond_vehicle, check_vehic
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Finding, Level, Limits
 from faao_mav.validate.check import Check, check
+from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing
 
 if TYPE_CHECKING:
@@ -408,15 +409,12 @@ def _may_lie_beside(mission: Path) -> set[Path]:
 def draw_mission(solution: Solution, conversion: Conversion) -> str:
     """Return the KML document of a mission: its route, the stations, and its predicted flight.
 
-    The flight begins at `DRAWING_START`.
+    The flight begins at `DRAWING_START`; stations that move go along with it.
     """
     plan = solution.plan
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     ground = plan.origin.elevation
-    stations = {
-        "base station": plan.radio.base_station.position,
-        "ground user": plan.radio.ground_user.position,
-    }
+    names = "base station", "ground user"
     track = predict(
         conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP, wind=plan.wind
     )
@@ -427,10 +425,17 @@ def draw_mission(solution: Solution, conversion: Conversion) -> str:
         return list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))
 
     moments = [DRAWING_START + timedelta(seconds=t) for t in track.t.tolist()]
-    places = np.array([(*place, 0.0) for place in stations.values()])
+    during = np.clip(predicted_line(solution, track).t, 0.0, plan.flight.duration)
+    stations, moving = {}, {"Flight": list(zip(moments, spots(track.position), strict=True))}
+    for name, station in zip(names, plan.radio.stations, strict=True):
+        way = spots(np.pad(station.at(during), ((0, 0), (0, 1))))
+        if station.moves:
+            moving[name] = list(zip(moments, way, strict=True))
+        else:
+            stations[name] = way[0]
     return write_kml(
         conversion.mission,
         name=plan.name or "relay flight",
-        stations=dict(zip(stations, spots(places), strict=True)),
-        flight=list(zip(moments, spots(track.position), strict=True)),
+        stations=stations,
+        moving=moving,
     )

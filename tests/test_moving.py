@@ -10,6 +10,7 @@ from conftest import SMALL, edited
 from hypothesis import given
 from hypothesis import strategies as st
 
+from faao_mav import optimize
 from faao_mav.errors import PlanError
 from faao_mav.plan import Plan, parse_plan, read_plan
 from faao_mav.plan.station import MAX_POINTS
@@ -160,3 +161,37 @@ def test_what_is_wrong_with_gpx_is_told(tmp_path: Path, text: str, told: str) ->
     message = refused(str(tmp_path / "ship.gpx"))
     assert told in message
     assert len(message.splitlines()) == 1
+
+
+CIRCLING = """
+site: {origin: {latitude: -35.36, longitude: 149.165}}
+vehicle: {type: plane, min_speed: 12, max_speed: 20, max_airspeed: 20, max_acceleration: 1.4}
+flight: {start: [0, 150], end: [150, 0], altitude: 80, duration: 30, time_step: 0.5,
+         start_velocity: free, end_velocity: free}
+radio:
+  base_station: {position: [0, 0], power_dbm: 10}
+  relay: {power_dbm: 10}
+  ground_user: {position: [200, 200]}
+  fading: none
+optimizer: {tolerance: 1.0e-8}
+"""
+
+
+def test_with_both_stations_at_u_a_plane_flies_as_to_stations_that_stand_in_a_wind_of_minus_u() -> (
+    None
+):
+    u = np.array([4.0, 3.0])
+    plan = parse_plan(CIRCLING)
+    standing = plan.changed({"site.wind": {"speed": 5, "from": math.degrees(math.atan2(*u))}})
+    gone = plan.flight.time_step * (plan.flight.slots - 1) * u
+    moving = plan.changed({
+        "flight.end": plan.flight.end + gone,
+        "vehicle.max_speed": 25,  # over the ground, which does not bind: solvers have one unit then
+        f"{BASE}.velocity": u, f"{USER}.velocity": u,
+    })  # fmt: skip
+    calm, windy = optimize(moving), optimize(standing)
+    np.testing.assert_allclose(calm.I_U, windy.I_U, atol=1e-6)
+    np.testing.assert_allclose(calm.I_G, windy.I_G, atol=1e-6)
+    np.testing.assert_allclose(calm.w - calm.t[:, None] * u, windy.w, atol=1e-3)
+    assert calm.delivered_rate == pytest.approx(windy.delivered_rate, abs=1e-6)
+    assert max(calm.residuals().values()) < 1e-6

@@ -31,7 +31,7 @@ def refused(changes: dict[str, Any]) -> str:
 def test_every_sample_plan_is_read_as_it_stands() -> None:
     for path in sorted(MISSIONS.glob("*.yaml")):
         text, plan = path.read_text(), read_plan(path)
-        assert plan.text == text or plan.radio.rates  # which stand in a file beside it
+        assert plan.text == text or ".csv" in text  # which stands beside it
         assert contents(parse_plan(plan.text)) == contents(plan)
 
 

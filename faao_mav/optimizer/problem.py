@@ -271,6 +271,20 @@ class Problem:
         """BS to UAV, UAV to user."""
         return self.bs_uav, self.uav_user
 
+    def begun(self, late: float) -> "Problem":
+        """Return the problem of a flight that begins `late`, s, to stations that move."""
+        first, second = (
+            replace(link, gains=replace(link.gains, station=_places(self.plan, station, late)))
+            for link, station in zip(self.links, self.plan.radio.stations, strict=True)
+        )
+        return replace(self, bs_uav=first, uav_user=second)
+
+
+def _places(plan: Plan, station: Station, late: float = 0.0) -> Real:
+    """Return where `station` is in slots that are `late`, s: (2,), or (N + 2, 2) where it moves."""
+    t = late + plan.flight.time_step * np.arange(float(plan.flight.slots))
+    return station.at(t) if station.moves else np.array(station.position)
+
 
 def counted_as_cutoff(problem: Problem) -> Problem:
     """Return `problem` with the cutoff rate as the rate that counts."""
@@ -305,7 +319,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
     laws = (parts["gain"],) * 2 if "gain" in parts else radio.path_gains
     maps = (None,) * 2 if "gain" in parts else tuple(law.map for law in radio.gain_laws)
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
-    rng, t = np.random.default_rng(radio.seed), plan.flight.time_step * np.arange(float(slots))
+    rng = np.random.default_rng(radio.seed)
 
     def link(
         name: str,
@@ -318,7 +332,6 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
         law: GainFunction,
         over: GainMap | None,
     ) -> Link:
-        places = station.at(t) if station.moves else np.array(station.position)
         match radio.fading:
             case "realization":
                 nlos: Complex | None = rayleigh(rng, slots, receive, transmit)
@@ -330,7 +343,7 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
             name=name,
             gains=GainField(
                 law,
-                places,
+                _places(plan, station),
                 plan.flight.altitude,
                 None if over is None else over.at(plan.flight.altitude),
             ),

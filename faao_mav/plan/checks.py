@@ -213,8 +213,7 @@ def _steps(flight: Flight) -> Iterator[str]:
 def _stations(plan: PlanContents) -> Iterator[str]:
     """Yield why a station cannot move as it is asked to."""
     lasts = plan.flight.duration
-    stations = {"base_station": plan.radio.base_station, "ground_user": plan.radio.ground_user}
-    for name, station in stations.items():
+    for name, station in zip(("base_station", "ground_user"), plan.radio.stations, strict=True):
         given, key = quote(list(station.velocity)), f"radio.{name}."
         away = float(np.abs(station.at(np.array([lasts]))).max())
         if station.track is not None and any(station.velocity):

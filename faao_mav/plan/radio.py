@@ -230,6 +230,11 @@ class Radio:
         return RateSteps.of(self.rates.snr_db, self.rates.bit_per_s_per_hz or megabits)
 
     @property
+    def stations(self) -> tuple[Station, Station]:
+        """The base station and the ground user."""
+        return self.base_station, self.ground_user
+
+    @property
     def gain_laws(self) -> tuple[GainLaw, GainLaw]:
         """What the plan says of the path gain of each hop, BS to UAV and UAV to user."""
         return self.base_station.gain or self.gain, self.ground_user.gain or self.gain

@@ -106,11 +106,10 @@ class FromLog:
         told = np.isfinite(self.record.rssi) & (flight.t >= 0) & (flight.t < plan.flight.duration)
         if not told.any():
             return None
-        ends = (plan.radio.base_station.position, plan.radio.ground_user.position)
         apart = [
             self.record.rssi[told] * SIK_STEP
-            - law.db(lengths(flight.w[told] - end), plan.flight.altitude)
-            for law, end in zip(plan.radio.path_gains, ends, strict=True)
+            - law.db(lengths(flight.w[told] - station.at(flight.t[told])), plan.flight.altitude)
+            for law, station in zip(plan.radio.path_gains, plan.radio.stations, strict=True)
         ]
         return int(told.sum()), float(np.std(apart[0])), float(np.std(apart[1]))
 

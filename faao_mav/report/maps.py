@@ -54,8 +54,8 @@ def route_map(
     East and north are in metres. It shows all of the flight and both stations, and of a wider fence
     what is near them.
     """
-    plan, radio = solution.plan, solution.plan.radio
-    stations = [radio.base_station.position, radio.ground_user.position]
+    plan = solution.plan
+    stations = [station.at(solution.t) for station in plan.radio.stations]
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     fence = plan.geofence if conversion is None else conversion.mission.fence
     outlines = _draw_fence(plot, fence, frame)
@@ -64,7 +64,7 @@ def route_map(
             name = f"margin {plan.fence.margin:g} m"
             plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
     _coloured(plot, solution)
-    seen, numbers = [solution.w, np.array(stations)], []
+    seen, numbers = [solution.w, *stations], []
     if flown is not None:
         seen.append(flown.w)
         plot.plot(*flown.w.T, color=SERIES[1], linewidth=1.6, label="flown")

@@ -135,18 +135,25 @@ def _plain(text: str) -> str:
 
 
 def mark_stations(
-    axes: "Axes",
-    places: Sequence[tuple[str, tuple[float, float], str]],
-    more: Sequence[tuple[str, Any]] = (),
+    axes: "Axes", places: Sequence[tuple[str, Any, str]], more: Sequence[tuple[str, Any]] = ()
 ) -> None:
-    """Mark (name, [east, north], marker) on a plot that is finished, with their names beside them.
+    """Mark (name, places (k, 2), marker) on a plot that is finished, with their names beside them.
 
-    Each `more` (text, [east, north]) is written too, where it covers nothing.
+    They are marked where they are first. Of one that moves the way is a line with an arrow, and a
+    hollow mark where it ends. Each `more` (text, [east, north]) is written too, where it covers
+    nothing.
     """
-    for _, (east, north), marker in places:
-        axes.plot([east], [north], marker, color=INK, markersize=7, zorder=5, scalex=False,
-                  scaley=False)  # fmt: skip
-    named = [(name, place) for name, place, _ in places]
+    held: Any = {"scalex": False, "scaley": False, "color": INK}
+    for _, way, marker in places:
+        axes.plot(*way[0], marker, markersize=7, zorder=5, **held)
+        left = lengths(np.asarray(way) - way[-1])
+        if left.any():
+            axes.plot(*np.transpose(way), linewidth=1.0, zorder=4, **held)
+            axes.plot(*way[-1], marker, markersize=7, markerfacecolor=PAPER, zorder=5, **held)
+            middle = int(np.argmax(left <= left[0] / 2))
+            arrow = {"arrowstyle": "-|>", "color": INK, "mutation_scale": 14}
+            axes.annotate("", way[middle], way[middle - 1], arrowprops=arrow, zorder=5)
+    named = [(name, way[0]) for name, way, _ in places]
     write_beside(axes, [*named, *more], always=len(named))
 
 

@@ -15,6 +15,7 @@ from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Level
 from faao_mav.validate.check import Check
+from faao_mav.validate.demands import LATE_START
 from faao_mav.validate.words import by_rule, count_of, counted, line_of
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result
@@ -140,6 +141,7 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield from _limits(solution)
     yield from _mission(result)
     yield from _wind(plan)
+    yield from _moving(solution, result.check)
     yield from _energy(result.check)
     yield from _fenced(result)
 
@@ -324,6 +326,22 @@ def _wind(plan: Plan) -> Iterator[Line]:
         told.append(f"gusts of {wind.gust:g} m/s")
     if told:
         yield "wind", "; ".join(told)
+
+
+def _moving(solution: Solution, check: Check | None) -> Iterator[Line]:
+    """Yield how stations move, and what it costs to meet them late."""
+    told = []
+    for name, station in zip(("base", "user"), solution.plan.radio.stations, strict=True):
+        if station.moves:
+            way = station.at(solution.t)
+            (x, y), (to_x, to_y) = way[0], way[-1]
+            gone = lengths(np.diff(way, axis=0)).sum()
+            told.append(f"{name} {gone:.0f} m from [{x:.0f}, {y:.0f}] to [{to_x:.0f}, {to_y:.0f}]")
+    if told:
+        yield "moving", "; ".join(told)
+    if check is not None and check.link is not None and check.link.late_share is not None:
+        late = f"met {LATE_START:g} s late, the plan delivers {100 * check.link.late_share:.1f} %; "
+        yield "", f"{late}it begins {check.link.begins:.0f} s after the mission"
 
 
 def _energy(check: Check | None) -> Iterator[Line]:

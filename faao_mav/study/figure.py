@@ -178,14 +178,10 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
 
 def as_map(plot: "Axes", plan: Plan, title: str) -> None:
     """Make `plot`, whose figure has all else, a map with the stations and the ends of `plan`."""
-    radio, flight = plan.radio, plan.flight
-    places = (
-        ("base station", radio.base_station.position, "s"),
-        ("user", radio.ground_user.position, "^"),
-        ("start", flight.start, "o"),
-        ("end", flight.end, "o"),
-    )
-    plot.plot(*zip(*(place for _, place, _ in places), strict=True), linestyle="none")
+    flight, t = plan.flight, plan.flight.time_step * np.arange(float(plan.flight.slots))
+    ways = [*(station.at(t) for station in plan.radio.stations), [flight.start], [flight.end]]
+    places = list(zip(("base station", "user", "start", "end"), ways, "s^oo", strict=True))
+    plot.plot(*np.concatenate(ways).T, linestyle="none")
     plot.set_aspect("equal", adjustable="datalim")
     plot.margins(0.1)
     label(plot, title, "east, m", "north, m")

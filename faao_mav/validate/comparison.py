@@ -6,6 +6,7 @@ it was edited in a ground station, as it was downloaded.
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,10 +15,10 @@ from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.initial_route import begins_at_speed
-from faao_mav.schedule.prediction import Prediction
+from faao_mav.schedule.prediction import Prediction, rates_along
 from faao_mav.schedule.schedule import passing
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.demands import LinkCheck, Stretch
+from faao_mav.validate.demands import LATE_START, LinkCheck, Stretch
 from faao_mav.validate.flown import Line, departure
 from faao_mav.vector import distances_to_path, lengths
 
@@ -63,17 +64,27 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         worst=_worst(solution, flown),
         unmeasured=tuple(_unmeasured(solution)),
         away=float(distances_to_path(line.w[::_EVERY], solution.w).min()),
+        begins=float(track.t[0] - line.t[0]),
+        late_share=_late_share(solution, flown),
     )
     return link, flown
+
+
+def _late_share(solution: Solution, flown: Prediction) -> float | None:
+    """Return the part of the planned rate that is delivered `LATE_START` later; None: as much."""
+    if not any(station.moves for station in solution.plan.radio.stations):
+        return None
+    late = replace(solution, problem=solution.problem.begun(LATE_START))
+    delivered = solution.relay(*rates_along(late, flown.w), solution.shares).rate
+    return delivered / solution.delivered_rate if solution.delivered_rate else 1.0
 
 
 def _unmeasured(solution: Solution) -> Iterator[str]:
     """Yield where more than `_SHARE` of the slots leave what the gain of a hop was measured at."""
     radio, height = solution.plan.radio, solution.plan.flight.altitude
-    places = radio.base_station.position, radio.ground_user.position
     names = "base station", "ground user"
-    for name, place, law in zip(names, places, radio.gain_laws, strict=True):
-        away = lengths(solution.w - place)
+    for name, station, law in zip(names, radio.stations, radio.gain_laws, strict=True):
+        away = lengths(solution.w - station.at(solution.t))
         angle, d = np.degrees(np.arctan2(height, away)), np.hypot(away, height)
         if law.elevation_deg is not None:
             low, high = law.elevation_deg

@@ -2,6 +2,7 @@
 
 from faao_mav.plan.radio_values import doubtful_values
 from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.demands import LATE_START
 from faao_mav.validate.rule import Hits, checks, hit
 
 GOOD_PERCENT = 99.5
@@ -62,3 +63,5 @@ def _flight(context: ValidationContext) -> Hits:
     if link.altitude_error > ALTITUDE_ERROR:
         yield hit("link-altitude")
     yield hit("link-timing", percent=percent)
+    if link.late_share is not None:
+        yield hit("link-moving", late=LATE_START, percent=100 * link.late_share)

@@ -9,6 +9,10 @@ from faao_mav.plan import Radio
 ELSEWHERE = 2_000.0
 """Metres that a mission comes no nearer to the planned path if it is of another place. Chosen."""
 
+LATE_START = 10.0
+"""Seconds by which a flight begins late to stations that move, where it is told what that costs.
+Chosen."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -56,7 +60,9 @@ class LinkCheck:
     `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
     None if none does; `bandwidth_mhz` is None where the plan has none. `radio` is what the plan
     says of both links, `away` the least distance, m, between the two paths. `unmeasured` says
-    where the planned route leaves what the gain of a hop was measured at.
+    where the planned route leaves what the gain of a hop was measured at. The plan begins `begins`
+    s after the mission; `late_share` is the part of the planned rate that one which begins
+    `LATE_START` later delivers, None where no station moves.
     """
 
     planned_rate: float
@@ -76,6 +82,8 @@ class LinkCheck:
     radio: Radio | None = None
     away: float = 0.0
     unmeasured: tuple[str, ...] = ()
+    begins: float = 0.0
+    late_share: float | None = None
 
     @property
     def elsewhere(self) -> bool:

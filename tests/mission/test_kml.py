@@ -42,7 +42,7 @@ def test_route_waypoints_stations_and_a_flight() -> None:
         (start + timedelta(seconds=61.5), (47.001, 8.002, 450.25)),
     ]
     stations = {"base <1>": (47.1, 8.1, 402.0)}
-    root = parsed(MISSION, name="valley & hill", stations=stations, flight=flight)
+    root = parsed(MISSION, name="valley & hill", stations=stations, moving={"Flight": flight})
     assert texts(root, "k:Placemark/k:name") == ["Route", "1", "3", "4", "base <1>", "Flight"]
     assert texts(root, "k:name")[0] == "valley & hill"
     assert texts(root, "k:LineString/k:altitudeMode") == ["absolute"]

@@ -45,15 +45,15 @@ def write_kml(
     name: str = "mission",
     *,
     stations: Mapping[str, Spot] | None = None,
-    flight: Sequence[tuple[datetime, Spot]] = (),
+    moving: Mapping[str, Sequence[tuple[datetime, Spot]]] | None = None,
 ) -> str:
-    """Return a KML document of `mission`: route, numbered waypoints, fence, stations, a flight.
+    """Return a KML document of `mission`: route, waypoints, fence, stations and what moves.
 
     The route is a line through the places that items fly to, the waypoints are numbered as the
     items are, from 1. Heights above home become heights above mean sea level by the mission's
     home; without one they are drawn above the ground. ArduPilot's "here" (a TAKEOFF or LAND at
     0, 0) is the place before it. `stations`, above mean sea level, are marked by their names;
-    `flight` moves along Google Earth's time slider.
+    what is `moving` goes along Google Earth's time slider.
     """
     waypoints = list(_waypoints(mission))
     known = ABOVE_SEA if _ground(mission) is None else ABOVE_SEA | ABOVE_HOME
@@ -74,8 +74,8 @@ def write_kml(
         parts += [_tag("Folder", _tag("name", folder) + inside)] if inside else []
     for station, spot in (stations or {}).items():
         parts.append(_placemark(station, _shape("Point", "absolute", spot)))
-    if flight:
-        parts.append(_placemark("Flight", _track(flight), "route"))
+    for moved, way in (moving or {}).items():
+        parts.append(_placemark(moved, _track(way), "route"))
     return "\n".join((_HEAD, _tag("Document", "\n".join(parts)), "</kml>", ""))
 
 
