@@ -113,6 +113,11 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         "waypoints": [],
         "margin": [],
         "zones": [],
+        "moving": [
+            [kind, degrees(thinned(station.at(flight.t)))]
+            for kind, station in zip(("base", "user"), plan.radio.stations, strict=True)
+            if station.moves
+        ],
     }
     if plan.fence is not None and (area := plan.keep_in) is not None:
         drawn["margin"] = [degrees(edge) for edge in area.inside(plan.fence.margin).edges()]

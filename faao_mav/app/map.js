@@ -11,6 +11,7 @@ const LINES = {
   margin: "margin of the fence",
   track: "predicted flight",
   flown: "flown",
+  moving: "stations move",
 };
 const NUDGE = 10, FINE = 1; // pixels by which an arrow key moves a marker, and with Shift
 
@@ -105,7 +106,7 @@ export default {
       this.shapes = zones;
       this.show_zones();
       this.show_key();
-      if (fit && stations.length) this.map.fitBounds(L.latLngBounds(stations.map((s) => s.at)).pad(0.35));
+      if (fit && stations.length) this.map.fitBounds(L.latLngBounds([...stations.map((s) => s.at), ...(this.ways ?? [])]).pad(0.35));
     },
     show_zones() {
       this.zones.clearLayers();
@@ -181,9 +182,9 @@ export default {
         this.$emit("zone", { key: null, inclusion, corners: points.map(pair), done: true });
       }
     },
-    // The flight: planned route coloured by speed, predicted track, waypoints, the fence's margin and
-    // the zones of its file.
-    flight({ places, speeds, top, shades, track, waypoints, margin, zones }) {
+    // The flight: planned route coloured by speed, predicted track, waypoints, the fence's margin, the
+    // zones of its file, and the ways of stations that move: hollow where they end.
+    flight({ places, speeds, top, shades, track, waypoints, margin, zones, moving }) {
       this.route.clearLayers();
       Object.assign(this, { top, shades });
       const line = (points, className, more = {}) =>
@@ -197,6 +198,16 @@ export default {
         from = k + 1;
       }
       if (track.length) line(track, "track");
+      this.ways = moving.flatMap(([, way]) => way);
+      for (const [kind, way] of moving) {
+        line(way, "moving");
+        const [from, to] = way.slice(-2).map((at) => this.map.latLngToContainerPoint(at));
+        const turned = `rotate(${Math.atan2(to.y - from.y, to.x - from.x)}rad)`;
+        const name = { base: "Base station", user: "User" }[kind];
+        const html = `<i style="transform: ${turned}">➤</i><span>${name} at the end</span>`;
+        L.circleMarker(way[0], { radius: 4, className: "moving", interactive: false }).addTo(this.route);
+        L.marker(way.at(-1), { icon: L.divIcon({ className: `mark mark-${kind} mark-later`, html, iconSize: [18, 18] }), interactive: false, keyboard: false }).addTo(this.route);
+      }
       const labelled = [];
       for (const [number, at] of waypoints) {
         const here = this.map.latLngToContainerPoint(at);

@@ -234,7 +234,7 @@ class Page:
             return
         here = frame.to_local(*at)
         text = f"{here[0]:.1f} m east, {here[1]:.1f} m north ({at[0]:.6f}, {at[1]:.6f})"
-        for station in scene.stations()[:2]:
+        for station in (each for each in scene.stations() if each["key"] in ("base", "user")):
             apart = np.hypot(*(here - frame.to_local(*station["at"])))
             text += f"; {station['label'].lower()} {apart:.0f} m"
         self._hint(text)

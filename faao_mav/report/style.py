@@ -150,7 +150,7 @@ def mark_stations(
         if left.any():
             axes.plot(*np.transpose(way), linewidth=1.0, zorder=4, **held)
             axes.plot(*way[-1], marker, markersize=7, markerfacecolor=PAPER, zorder=5, **held)
-            middle = int(np.argmax(left <= left[0] / 2))
+            middle = max(1, int(np.argmax(left <= left[0] / 2)))
             arrow = {"arrowstyle": "-|>", "color": INK, "mutation_scale": 14}
             axes.annotate("", way[middle], way[middle - 1], arrowprops=arrow, zorder=5)
     named = [(name, way[0]) for name, way, _ in places]

@@ -33,7 +33,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import write_mission
 from faao_mav.mission.item import Home, Mission
-from faao_mav.plan import parse_plan
+from faao_mav.plan import parse_plan, read_plan
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.sim.faults import Faults
 
@@ -392,6 +392,28 @@ def test_zones_of_a_file_are_red_or_green_and_the_key_says_so(
     assert sorted(drawn) == [("zone-in", green), ("zone-out", red), ("zone-out", red)]
     key = page.locator(".key").inner_text().split("\n")
     assert key[1:] == ["stay in", "stay out", "margin of the fence", "predicted flight"]
+    page.close()
+
+
+def test_a_station_that_moves_has_a_way_which_goes_along_when_it_is_dragged(served: Served) -> None:
+    served.plan.with_name("way.csv").write_text("time_s,east_m,north_m\n0,60,60\n14,95,60\n")
+    text = PLAN.replace("base_station: {", "base_station: {velocity: [3, 0], ")
+    served.plan.write_text(text.replace("{position: [60, 60]", "{track: way.csv"))
+    page = served.window()
+    marks = page.locator(".mark span").all_inner_texts()
+    assert {"Base station at the end", "User at the end"} < {*marks}
+    assert "User" not in marks  # its track is a file
+    drag(page, "Base station", 10, 40)
+    saved(page, served)
+    finished(page)
+    plan = read_plan(served.plan)
+    base, user = plan.radio.stations
+    assert base.velocity == (3, 0)
+    assert base.position[1] > 5
+    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    ends = [place for each in (base, user) for place in each.at(np.array([0.0, 13.5]))]
+    drawn = np.array(page.evaluate(f"{MAP}.ways"))[[0, 27, 28, -1]]
+    np.testing.assert_allclose(frame.to_local(*drawn.T), ends, atol=0.01)
     page.close()
 
 
