@@ -141,6 +141,11 @@ def quality(quick: bool, random: int) -> None:
         if not quick or (T, W) in ((10, 20), (50, 20))
     ]
     rows.append(("copter_relay, no fading", plan("copter_relay", fading="none"), not quick, True))
+    for of_base, of_user in (((0, 0), (-5, 0)), ((0, 4), (0, 4)), ((0, 4), (-5, 0))):
+        moving = plan("paper_active").changed({
+            "radio.base_station.velocity": of_base, "radio.ground_user.velocity": of_user,
+        })  # fmt: skip
+        rows.append((f"at {of_base} and {of_user} m/s", moving, False, True))
     if not quick:
         qpsk = plan("paper_active", modulation="qpsk")
         rows.append(("paper_active T=50 qpsk", qpsk, True, True))

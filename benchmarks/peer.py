@@ -72,7 +72,7 @@ def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
     names: list[str] = (
         ["straight", "bs", "user", "bs-user", "user-bs"] if "global" in named else [*named]
     )
-    places = {"bs": problem.bs_uav.gains.station, "user": problem.uav_user.gains.station}
+    places = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
     rng, kin = np.random.default_rng(0), problem.kinematics
     corners = np.stack([*places.values(), kin.start, kin.end])
     low, high = corners.min(axis=0) - 50, corners.max(axis=0) + 50
@@ -129,7 +129,7 @@ def at_best(link: Link, w: Real) -> ClassRate:
 
 def _rate(rate: ClassRate | Curve, w: Any, c: Any) -> Any:
     """The rate (1, n) at scaled positions w (2, n), c (k, n) in units of 1 / `gain`."""
-    p, H = rate.link.gains.station / LENGTH, rate.link.gains.height / LENGTH
+    p, H = np.reshape(rate.link.gains.station.T, (2, -1)) / LENGTH, rate.link.gains.height / LENGTH
     away = (ca.DM(w) if isinstance(w, np.ndarray) else w) - p
     law, squared = rate.link.gains.law, ca.sum1(away**2) + H**2
     assert isinstance(law, PathGain)
