@@ -5,10 +5,11 @@ A tape is the datagrams one after the other, before each its length in two bytes
 
 import math
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from random import Random
 from typing import Any
 
+from mutate import changed, damaged
 from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
@@ -107,58 +108,16 @@ def recorded(
 def mutated(tape: bytes, others: Sequence[bytes], random: Random) -> bytes:
     """Return `tape` after one to four changes of its datagrams; some come from the `others` too."""
     found = list(datagrams(tape))
-    for _ in range(random.choice((1, 1, 2, 4))):
-        random.choice(_CHANGES)(found, others, random)
+    changed(found, list(datagrams(random.choice(others))), random, _odd)
     return tape_of(found)
 
 
-Change = Callable[[list[bytes], Sequence[bytes], Random], None]
-
-
-def _place(found: Sequence[bytes], random: Random) -> int:
-    return random.randrange(len(found)) if found else 0
-
-
-def _lose(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
-    start = _place(found, random)
-    del found[start : start + random.choice((1, 1, 3, 20))]
-
-
-def _repeat(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
-    start = _place(found, random)
-    part = found[start : start + random.choice((1, 1, 5))]
-    found[start:start] = part * random.choice((1, 1, 2, 30))
-
-
-def _swap(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
-    if found:
-        one, other = _place(found, random), _place(found, random)
-        found[one], found[other] = found[other], found[one]
-
-
-def _splice(found: list[bytes], others: Sequence[bytes], random: Random) -> None:
-    other = list(datagrams(random.choice(others)))
-    start, end = _place(other, random), _place(found, random)
-    found[end:] = other[start:]
-
-
-def _damage(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
-    if found and found[place := _place(found, random)]:
-        content = bytearray(found[place])
-        content[random.randrange(len(content))] = random.randrange(256)
-        found[place] = bytes(content[: random.choice((len(content), random.randrange(300)))])
-
-
-def _noise(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
+def _odd(packet: bytes, random: Random) -> bytes:
+    """Return noise, or `packet` damaged, or with a lie in it under a right checksum."""
     start = random.choice((b"", b"\xfd", b"\xfe", b"\xfd\xff\x00", b"\xfd\x09\x01"))
-    found.insert(_place(found, random), start + random.randbytes(random.choice((0, 5, 40, 300))))
-
-
-def _lie(found: list[bytes], _: Sequence[bytes], random: Random) -> None:
-    """Change a packet's payload, sender or message and make its checksum right."""
-    if found:
-        place = _place(found, random)
-        found[place] = _lied(found[place], random)
+    noise = start + random.randbytes(random.choice((0, 5, 40, 300)))
+    lie = _lied(packet, random)
+    return random.choice((lie, lie, lie, damaged(packet, random), noise)) if packet else noise
 
 
 def _lied(packet: bytes, random: Random) -> bytes:
@@ -176,9 +135,3 @@ def _lied(packet: bytes, random: Random) -> bytes:
     header[1] = len(content)
     checksum: int = x25crc(bytes(header[1:] + content + bytes([kind.crc_extra]))).crc
     return bytes(header + content) + checksum.to_bytes(2, "little")
-
-
-_CHANGES: tuple[Change, ...] = (
-    *(_lie, _lie, _lie, _lie, _lie, _lie),
-    *(_lose, _repeat, _swap, _splice, _damage, _noise),
-)
