@@ -13,7 +13,6 @@ import os
 import sys
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -31,7 +30,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import link
 from faao_mav.wire.client import upload
-from faao_mav.wire.transport import Transport, open_transport
+from faao_mav.wire.transport import open_transport
 
 SPEEDUP = 2
 BEGIN = 25.0
@@ -52,41 +51,33 @@ FAULTS = {
 CASES = ("none", "wind", "silence", *FAULTS)
 
 
-@dataclass
 class Disturbance:
     """What happens to the link of a flight, as its plan's clock goes on."""
 
-    case: str
-    transport: Transport | None = None
-    listens: bool = True
-    silent_until: float = 0.0
+    listens, silent_until = True, 0.0
+
+    def __init__(self, case: str) -> None:
+        self.case = case
 
     def opened(self, text: str) -> "Disturbance | FaultyTransport":
         """Open the link."""
         self.transport = open_transport(text)
+        self.close = self.transport.close
         return FaultyTransport(self, FAULTS[self.case]) if self.case in FAULTS else self
 
     def read(self, timeout: float) -> list[tuple[bytes, str]]:
-        assert self.transport is not None
         arrived = self.transport.read(timeout)
         return [] if time.monotonic() < self.silent_until else arrived
 
     def write(self, data: bytes, to: str | None = None) -> None:
-        assert self.transport is not None
         if time.monotonic() >= self.silent_until:
             self.transport.write(data, to)
-
-    def close(self) -> None:
-        assert self.transport is not None
-        self.transport.close()
 
     def __call__(self, watch: Watch) -> None:
         """Break the link when that is due."""
         fixes, start = watch.seen.fixes, watch.relay_start
-        if start is None or not fixes:
-            return
-        t = fixes[-1].t - start
-        if self.case == "silence" and t > BEGIN and not self.silent_until:
+        flies = start is not None and fixes and fixes[-1].t - start > BEGIN
+        if self.case == "silence" and flies and not self.silent_until:
             self.silent_until = time.monotonic() + 8 / SPEEDUP
 
 

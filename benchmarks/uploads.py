@@ -10,7 +10,7 @@ counted apart. "right" is what the mock holds afterwards, by its own storage.
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,54 +26,49 @@ from served import running
 from stations import HOME, a_mission, places
 
 from faao_mav.errors import LinkError
-from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.mission import Mission
+from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import upload
+from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.wire_items import wire_items
 
-KINDS: tuple[MockKind, ...] = ("px4", "ardupilot")
 
-
-def ours(kind: MockKind, count: int, faults: Faults) -> tuple[str, float, float, bool]:
-    """Return what our client says, its upload and read-back times (s), and whether it is right."""
-    mock, port, stages = a_mock(kind), free_port(), dict[str, float]()
+def ours(mock: MockAutopilot, mission: Mission, faults: Faults) -> str:
+    """Return what our client says, and its times of uploading and reading back, s, as cells."""
+    port, stages = free_port(), dict[str, float]()
 
     def observe(what: str, done: int, total: int) -> None:
         stages.setdefault(what.split()[0], time.monotonic())
 
     with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
         try:
-            report = upload(a_mission(count), f"udpout:127.0.0.1:{port}", system=1, observe=observe)
+            report = upload(mission, f"udpout:127.0.0.1:{port}", system=1, observe=observe)
             said: str = report.parts[0].verdict
         except LinkError as error:
             said = str(error)
     end = time.monotonic()
     read = stages.get("reading", end)
-    return said, read - stages.get("uploading", end), end - read, is_right(mock, count)
+    return f"{said} | {read - stages.get('uploading', end):.2f} | {end - read:.2f}"
 
 
-def mavsdk(kind: MockKind, count: int, faults: Faults) -> tuple[str, float, float, bool]:
+def mavsdk(mock: MockAutopilot, rows: tuple[WireItem, ...], faults: Faults) -> str:
     """Return the same of MAVSDK, which does not read back."""
-    mock, port = a_mock(kind), free_port()
-    rows = wire_items(a_mission(count), MissionType.MISSION, mock.vehicle)
+    port = free_port()
     items = [
         SdkItem(seq, r.frame, r.command, r.current, 1, *r.params, r.x, r.y, r.z, 0)
         for seq, r in enumerate(rows)
     ]
     with a_mavsdk(port) as sdk, running(mock, f"udpout:127.0.0.1:{port}", faults=faults):
         system = sdk.first_autopilot(20.0)
-        if system is None:
-            return "no vehicle", 0.0, 0.0, False
-        client = MissionRaw(system)
-        begin = time.monotonic()
+        assert system is not None
+        client, begin, said = MissionRaw(system), time.monotonic(), "success"
         try:
             client.upload_mission(items)
-            said = "success"
         except MissionRawError as error:
             said = str(error).split(";")[0][:30]
-        took = time.monotonic() - begin
-    return said, took, 0.0, is_right(mock, count)
+        return f"{said} | {time.monotonic() - begin:.2f} | -"
 
 
 @contextmanager
@@ -86,40 +81,28 @@ def a_mavsdk(port: int) -> Iterator[Mavsdk]:
         sdk.destroy()
 
 
-def a_mock(kind: MockKind) -> MockAutopilot:
-    return MockAutopilot(behaviour_of(kind), home=HOME, beat=0.1)
-
-
-def is_right(mock: MockAutopilot, count: int) -> bool:
-    rows = wire_items(a_mission(count), MissionType.MISSION, mock.vehicle)
-    return places(mock.lists.items(MissionType.MISSION)) == places(rows)
-
-
-Client = Callable[[MockKind, int, Faults], tuple[str, float, float, bool]]
-CLIENTS: dict[str, Client] = {"faao-mav": ours, "MAVSDK 4.1.0": mavsdk}
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--quick", action="store_true", help="40 items only")
-    parser.add_argument("--seeds", type=int, default=1)
-    options = parser.parse_args()
-    print("| mock | items | loss | client | says | right | upload, s | read back, s |")
+    counts = (40,) if parser.parse_args().quick else (40, 650)
+    print("| mock | items | loss | client | says | upload, s | read back, s | right |")
     print("|---|---|---|---|---|---|---|---|")
-    for kind in KINDS:
-        for count in (40,) if options.quick else (40, 650):
-            for loss in (0.0, 0.05, 0.2):
-                for seed in range(options.seeds):
-                    for name, client in CLIENTS.items():
-                        faults = Faults(loss=loss, latency=0.0, seed=seed)
-                        said, took, read, right = client(kind, count, faults)
-                        back = f"{read:.2f}" if read else "-"
-                        print(
-                            f"| {kind} | {count} | {loss:.0%} | {name} | {said} "
-                            f"| {'yes' if right else 'no'} | {took:.2f} | {back} |",
-                            flush=True,
-                        )
+    for kind in ("px4", "ardupilot"):
+        behaviour = behaviour_of("px4" if kind == "px4" else "ardupilot")
+        for count, loss in ((count, loss) for count in counts for loss in (0.0, 0.05, 0.2)):
+            mission, faults = a_mission(count), Faults(loss=loss, latency=0.0)
+            for client in ("faao-mav", "MAVSDK 4.1.0"):
+                mock = MockAutopilot(behaviour, home=HOME, beat=0.1)
+                rows = wire_items(mission, MissionType.MISSION, mock.vehicle)
+                cells = (
+                    ours(mock, mission, faults)
+                    if client == "faao-mav"
+                    else mavsdk(mock, rows, faults)
+                )
+                right = places(mock.lists.items(MissionType.MISSION)) == places(rows)
+                row = f"| {kind} | {count} | {loss:.0%} | {client} | {cells}"
+                print(f"{row} | {'yes' if right else 'no'} |", flush=True)
 
 
 if __name__ == "__main__":
