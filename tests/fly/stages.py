@@ -106,6 +106,8 @@ class Stage:
                 self.scene.tells(during(begin, end, changed))
             elif words == ["blind"]:
                 self._blinds(begin)
+            elif words == ["hold-up"]:
+                self._holds_up(begin, end)
             elif words[0] in ("station", "twin", "companion"):
                 address = {"station": FOREIGN, "companion": Address(1, 191)}.get(
                     words[0], GROUND_STATION
@@ -128,6 +130,20 @@ class Stage:
             lambda said, now: [said][isinstance(said, GlobalPositionInt) and now > begin :]
         )
 
+    def _holds_up(self, begin: float, end: float) -> None:
+        """Hold back all that the vehicle says, and then deliver it at once."""
+        held = list[Message]()
+
+        def bursts(said: Message, now: float) -> Sequence[Message]:
+            if begin <= now < end:
+                held.append(said)
+                return ()
+            out = [*held, said]
+            held.clear()
+            return out
+
+        self.scene.tells(bursts)
+
     def _event(self, word: str, number: str = "0") -> Any:
         scene, mock = self.scene, self.scene.mock
 
@@ -145,6 +161,9 @@ class Stage:
                 return lambda _: setattr(mock, "home", away(60.0))
             case "current":
                 return scene.does(MavCommand.SET_CURRENT, float(number))
+            case "shorten":
+                rows = mock.lists.items(MissionType.MISSION)[:-2]
+                return change(MissionType.MISSION, rows)
             case "change":  # an item of its mission
                 rows = list(mock.lists.items(MissionType.MISSION))
                 rows[5] = rows_for(self.kind, 12, shift=1e-4)[5]

@@ -1,7 +1,6 @@
 """Flights by setpoints: the plan is kept, and what no scene can say of streams in trouble."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +25,6 @@ from faao_mav.validate.flown import FlightRecord
 from faao_mav.wire.messages import (
     CurrentMode,
     Heartbeat,
-    Message,
     SetPositionTargetLocalNed,
     Timesync,
 )
@@ -95,12 +93,6 @@ def test_it_ends_as_the_plan_says_inside_its_fence(finish: str) -> None:
         Scene("ardupilot", solution=replace(solution, v=velocity))
 
 
-def test_the_mock_is_late_in_a_wind_that_is_too_strong() -> None:
-    scene = Scene("ardupilot", solution=low(), wind=(0.0, 9.0))  # it flies south
-    assert scene.run() == "finished"
-    assert flown(scene, low()).rms_position_error > 3
-
-
 @KINDS
 @given(north=st.floats(-5e3, 5e3), east=st.floats(-5e3, 5e3), latitude=st.floats(-60, 60))
 def test_local_frames_go_there_and_back(
@@ -124,44 +116,6 @@ def test_what_others_asked_tells_nothing_of_the_link() -> None:
         clock.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
     assert clock.speed == pytest.approx(2.0)
     assert clock.lead == pytest.approx(0.2)
-
-
-def test_after_px4s_landing_failsafe_it_climbs_before_it_goes_on() -> None:
-    scene = Scene("px4", solution=swift(), parameters={"COM_OBL_RC_ACT": 4})
-    heights = list[float]()
-    events = [(57.5, lambda _: heights.append(scene.mock.posture(57.5).position[2]))]
-    assert scene.run(Faults(outages=((46.0, 57.4),)), events=events) == "finished"
-    assert 1.0 < heights[0] < 20.0
-    assert scene.told("it is in its failsafe")
-    assert scene.told("off its flight, and led back to it")
-    scene.assert_gated()
-    places, off = np.array(scene.places), scene.off
-    climbs = (np.array(scene.times) > 57.4) & (places[:, 2] < 26.0)
-    assert climbs.sum() > 50
-    assert np.hypot(*off[climbs, :2].T).max() < 0.5
-    scene.assert_arrived()
-
-
-def test_where_no_way_leads_back_it_is_left_to_its_failsafe() -> None:
-    """Its way home, by its failsafe, leads over the zone; there it is heard again."""
-    scene = Scene("px4", solution=swift(fenced=True), parameters={"COM_OBL_RC_ACT": 3})
-    mock, solution = scene.mock, swift(fenced=True)
-    area = solution.plan.keep_in
-    assert area is not None
-
-    over = list[float]()
-
-    def silent(message: Message, now: float) -> Sequence[Message]:
-        place = mock.posture(now).position[None, :2]
-        if now > 60.0 and not over and not area.covers(place).all():
-            over.append(now)
-        return [message] if now < 60.0 or over else []
-
-    scene.tells(silent)
-    assert scene.run() == "taken over"
-    assert over
-    assert scene.told("setpoints end: no way inside the fence leads it back")
-    scene.assert_gated()
 
 
 def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> None:
@@ -189,28 +143,6 @@ def test_what_it_does_without_setpoints_has_to_be_known(kind: str) -> None:
     assert rules.refusal(values) is None
     for value in (math.nan, 2.5):
         assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
-
-
-@KINDS
-def test_positions_that_come_late_at_once_are_not_answered(kind: str) -> None:
-    """A link holds back all that it is given for 6 s, and then delivers it."""
-    held = list[Message]()
-
-    def bursts(message: Message, now: float) -> Sequence[Message]:
-        if 44.0 <= now < 50.0:
-            held.append(message)
-            return ()
-        out = [*held, message]
-        held.clear()
-        return out
-
-    scene = Scene(kind, solution=swift(), parameters={"COM_OBL_RC_ACT": 5})
-    scene.tells(bursts)
-    assert scene.run() == "finished"
-    scene.assert_gated(lag=8.0)
-    told = [each.time_boot_ms / 1000 for each in setpoints(scene)]
-    assert not any(44.1 < each < 48.9 for each in told)
-    assert any(48.9 < each < 51.0 for each in told)
 
 
 def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:

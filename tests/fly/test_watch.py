@@ -2,47 +2,15 @@
 
 from collections.abc import Callable
 
-import numpy as np
 import pytest
-from flight_logs import heights
-from mock_flights import fly
 from scenes import Scene, arms, starts
-from stations import VEHICLE, a_mission, rows_for
+from stations import VEHICLE
 
 from faao_mav.wire.messages import CommandAck, Envelope
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
 
 KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 ARM, DISARM, START = (MavCommand.ARM, 1.0), (MavCommand.ARM, 0.0), (MavCommand.START, 0.0)
-
-
-@KINDS
-def test_armed_started_and_watched_to_the_end(kind: str) -> None:
-    scene = Scene(kind, arm=True)
-    assert scene.run() == "finished"
-    assert not scene.mock.armed
-    assert list(dict.fromkeys(scene.commands)) == [ARM, START]
-    record, track = scene.watch.seen.record(), fly(a_mission(12))
-    assert (np.diff(record.t) > 0).all()
-    assert heights(record).max() == pytest.approx(track.position[:, 2].max(), abs=0.5)
-    assert heights(record)[-1] < 5
-    assert np.diff(record.t).max() == pytest.approx(0.2, abs=0.06)
-
-
-def test_a_pilot_who_is_quicker_than_the_start() -> None:
-    """The answer to arming is lost, and the pilot changes the mode."""
-    scene = Scene("ardupilot", arm=True)
-    scene.loses(lambda message, now: arms(message) and [scene.sets(5)(now)], heard=True)
-    assert scene.run(until=30.0) == ""
-    assert scene.watch.phase == "aside"
-    assert {*scene.commands} == {ARM}
-
-
-@KINDS
-def test_a_mission_that_is_another_one_from_the_beginning_is_not_watched(kind: str) -> None:
-    scene = Scene(kind)
-    scene.mock.lists.replace(MissionType.MISSION, rows_for(kind, 12)[:-2])
-    assert scene.run() == "changed"
 
 
 def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
