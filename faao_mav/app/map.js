@@ -13,6 +13,7 @@ const LINES = {
   flown: "flown",
   moving: "stations move",
 };
+const SIDES = [[1, -1], [1, 1], [1, 0], [-1, -1], [-1, 1], [-1, 0], [0, -1], [0, 1]]; // of a waypoint, for its number
 const NUDGE = 10, FINE = 1; // pixels by which an arrow key moves a marker, and with Shift
 
 // The colour at a share of the way along `shades`, #rrggbb each.
@@ -32,25 +33,24 @@ function icon(kind, label = "") {
 }
 
 export default {
-  template: '<div class="planner-map" role="application" aria-label="Map"></div>',
+  template: '<div class="planner-map"><div role="application" aria-label="Map"></div><div class="key"></div></div>',
   props: { resourcePath: String },
   async mounted() {
     await this.$nextTick();
     await loadResource(`${window.path_prefix}${this.resourcePath}/leaflet/leaflet.css`);
-    this.map = L.map(this.$el, { zoomSnap: 0.25, doubleClickZoom: false, center: [0, 0], zoom: 2 });
+    this.map = L.map(this.$el.firstElementChild, { zoomSnap: 0.25, doubleClickZoom: false, center: [0, 0], zoom: 2 });
     this.map.attributionControl.setPrefix(false);
     L.control.scale({ imperial: false }).addTo(this.map);
-    const legend = L.control({ position: "topright" });
-    legend.onAdd = () => (this.key = L.DomUtil.create("div", "key"));
-    legend.addTo(this.map);
     const group = () => L.layerGroup().addTo(this.map);
-    Object.assign(this, { zones: group(), route: group(), marks: group(), handles: group() });
+    Object.assign(this, { zones: group(), route: group(), dots: group(), marks: group(), handles: group() });
+    Object.assign(this, { lines: [], waypoints: [] });
     this.aircraft = L.marker([0, 0], { icon: icon("aircraft", "✈"), interactive: false, zIndexOffset: 900 });
     this.vehicle = L.marker([0, 0], { icon: icon("vehicle", "Vehicle"), interactive: false, zIndexOffset: 950 });
     this.track = L.polyline([], { className: "flown", interactive: false });
     this.map.on("mousemove", (e) => this.tell("cursor", { at: pair(e.latlng) }));
     this.map.on("click", (e) => (this.drawing ? this.corner(e.latlng) : this.select(null)));
     this.map.on("dblclick", () => this.finish());
+    this.map.on("zoomend", () => this.show_waypoints());
     this.$el.addEventListener("keydown", (e) => {
       if (e.key === "Escape") this.draw(null);
       if (e.key === "Enter" && this.drawing) this.finish();
@@ -186,7 +186,7 @@ export default {
     // zones of its file, and the ways of stations that move: hollow where they end.
     flight({ places, speeds, top, shades, track, waypoints, margin, zones, moving }) {
       this.route.clearLayers();
-      Object.assign(this, { top, shades });
+      Object.assign(this, { top, shades, waypoints, lines: [places, ...margin] });
       const line = (points, className, more = {}) =>
         L.polyline(points, { className, interactive: false, ...more }).addTo(this.route);
       for (const ring of margin) line(ring, "margin");
@@ -208,20 +208,40 @@ export default {
         L.circleMarker(way[0], { radius: 4, className: "moving", interactive: false }).addTo(this.route);
         L.marker(way.at(-1), { icon: L.divIcon({ className: `mark mark-${kind} mark-later`, html, iconSize: [18, 18] }), interactive: false, keyboard: false }).addTo(this.route);
       }
-      const labelled = [];
-      for (const [number, at] of waypoints) {
-        const here = this.map.latLngToContainerPoint(at);
-        const apart = labelled.every((other) => here.distanceTo(other) > 18); // pixels; numbers do not overlap
-        if (apart) labelled.push(here);
-        const html = `<b></b>${apart ? `<i>${Number(number)}</i>` : ""}`;
-        L.marker(at, { icon: L.divIcon({ className: "waypoint", html, iconSize: [0, 0] }), interactive: false, keyboard: false }).addTo(this.route);
-      }
+      this.show_waypoints();
       this.show_key();
       this.$el.dataset.drawn = Number(this.$el.dataset.drawn ?? 0) + 1;
     },
+    // A dot at each waypoint, and its number beside it where that covers no line, mark or number.
+    show_waypoints() {
+      this.dots.clearLayers();
+      const on_screen = (place) => this.map.latLngToContainerPoint(place);
+      const along = (places) => places.map(on_screen).flatMap((here, k, all) => {
+        const way = (all[k + 1] ?? here).subtract(here), steps = Math.ceil(way.distanceTo([0, 0]) / 6) || 1; // 6 pixels each
+        return Array.from({ length: steps }, (_, i) => here.add(way.multiplyBy(i / steps)));
+      });
+      const edges = this.shapes?.flatMap(({ corners }) => (corners ? [[...corners, corners[0]]] : [])) ?? [];
+      const lines = [...this.lines, ...edges].flatMap(along);
+      const taken = this.marks.getLayers().map((mark) => {
+        const here = on_screen(mark.getLatLng());
+        return L.bounds(here.subtract([12, 12]), here.add([24 + 8 * mark.options.title.length, 12]));
+      });
+      for (const [number, at] of this.waypoints) {
+        const here = on_screen(at), half = L.point(4 + 3.5 * `${number}`.length, 9); // pixels, 3 of them clear
+        const boxes = SIDES.map(([x, y]) => here.add([x * (half.x + 3), y * (half.y + 3)]));
+        const free = boxes.map((middle) => L.bounds(middle.subtract(half), middle.add(half)));
+        const box = free.find((each) => !taken.some((other) => other.intersects(each)) && !lines.some((place) => each.contains(place)));
+        if (box) taken.push(box);
+        const { x, y } = box ? box.getCenter().subtract(here) : {};
+        const html = `<b></b>${box ? `<i style="left: ${x}px; top: ${y}px">${Number(number)}</i>` : ""}`;
+        const dot = L.divIcon({ className: "waypoint", html, iconSize: [0, 0] });
+        L.marker(at, { icon: dot, interactive: false, keyboard: false }).addTo(this.dots);
+      }
+    },
     clear_flight() {
       this.route.clearLayers();
-      this.top = null;
+      Object.assign(this, { top: null, lines: [], waypoints: [] });
+      this.show_waypoints();
       this.show_key();
       this.aircraft.remove();
     },
@@ -232,7 +252,7 @@ export default {
       const lines = Object.entries(LINES).filter(([name]) => there(name));
       const row = ([name, text]) => `<svg><path class="${name}" d="M0 4H22"/></svg>${text}`;
       const rows = [...(this.top ? [speeds] : []), ...lines.map(row)];
-      this.key.innerHTML = rows.map((each) => `<div>${each}</div>`).join("");
+      this.$el.lastElementChild.innerHTML = rows.map((each) => `<div>${each}</div>`).join("");
     },
     place_aircraft(at) {
       if (at) this.aircraft.setLatLng(at).addTo(this.map);

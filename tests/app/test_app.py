@@ -1,6 +1,7 @@
 """The planner page in a real Chromium: what is dragged and drawn, told, downloaded and uploaded."""
 
 import base64
+import itertools
 import json
 import math
 import os
@@ -392,6 +393,14 @@ def test_zones_of_a_file_are_red_or_green_and_the_key_says_so(
     assert sorted(drawn) == [("zone-in", green), ("zone-out", red), ("zone-out", red)]
     key = page.locator(".key").inner_text().split("\n")
     assert key[1:] == ["stay in", "stay out", "margin of the fence", "predicted flight"]
+    # the numbers of waypoints stand apart from each other and from the marks
+    boxes = page.locator(".waypoint i, .mark").evaluate_all(
+        "(all) => all.map((each) => each.getBoundingClientRect().toJSON())"
+    )
+    assert len(boxes) > 5
+    for one, other in itertools.combinations(boxes, 2):
+        across = one["left"] < other["right"] and other["left"] < one["right"]
+        assert not (across and one["top"] < other["bottom"] and other["top"] < one["bottom"])
     page.close()
 
 
