@@ -74,7 +74,9 @@ class Workers:
                 raise FaaoError(_ENDED) from None
             finally:
                 process.kill()
-        returned: T = _returned(value, error)
+        if error is not None:
+            raise error
+        returned: T = value
         return returned
 
     def stop(self) -> None:
@@ -98,7 +100,7 @@ async def talk(
     other raises KeyboardInterrupt once `interrupt` was set. Cancelled, it is interrupted.
     """
     loop = asyncio.get_running_loop()
-    ended: asyncio.Future[tuple[Any, Exception | None]] = loop.create_future()
+    ended: asyncio.Future[T] = loop.create_future()
 
     def call(act: Callable[[Any], object], value: object) -> None:
         with suppress(RuntimeError):  # the server has ended meanwhile
@@ -110,15 +112,16 @@ async def talk(
             raise KeyboardInterrupt
 
     def run() -> None:
-        told = (lambda said: call(hear, said), look, *arguments)
-        call(ended.set_result, _outcome(work, told))
+        try:
+            call(ended.set_result, work(lambda said: call(hear, said), look, *arguments))
+        except Exception as error:  # told to whom has asked
+            call(ended.set_exception, error)
 
     interrupt.clear()
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     try:
-        returned: T = _returned(*await ended)
-        return returned
+        return await ended
     except asyncio.CancelledError:
         interrupt.set()
         await asyncio.to_thread(thread.join, _GRACE)
@@ -134,19 +137,7 @@ def _job(end: Connection, work: Callable[..., object], arguments: tuple[object, 
     _prepare()
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    end.send(_outcome(work, arguments))
-
-
-def _outcome(
-    work: Callable[..., object], arguments: tuple[object, ...]
-) -> tuple[object, Exception | None]:
     try:
-        return work(*arguments), None
+        end.send((work(*arguments), None))
     except Exception as error:  # told to whom has asked
-        return None, error
-
-
-def _returned(value: Any, error: Exception | None) -> Any:
-    if error is not None:
-        raise error
-    return value
+        end.send((None, error))

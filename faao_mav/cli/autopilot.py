@@ -18,8 +18,6 @@ from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
     from faao_mav.sim import MockAutopilot
-    from faao_mav.wire.messages import WireItem
-    from faao_mav.wire.protocol import MissionType
 
 _HIGHEST = 100_000.0
 """The greatest altitude of a home, m: chosen, where space begins; the wire carries millimetres."""
@@ -118,37 +116,34 @@ def autopilot(
     try:
         serve(mock, transport, faults=faults, key=key, observe=diary)
     except KeyboardInterrupt:
-        diary.finish()
+        diary.tell()
         typer.echo("ended")
 
 
 class Diary:
-    """Tells what changes on a mock autopilot, lists when they have come to rest."""
+    """Tells what changes on a mock autopilot once nothing has changed for a while."""
 
     def __init__(self) -> None:
-        self._told: dict[MissionType, tuple[WireItem, ...]] = {}
-        self._seen: dict[MissionType, tuple[WireItem, ...]] = {}
+        self._told: dict[str, object] = {}
+        self._seen: dict[str, object] = {}
         self._changed = 0.0
-        self._armed = False
 
     def __call__(self, mock: "MockAutopilot") -> None:
-        """Print what is new since the last call."""
+        """Print what has come to rest since the last call."""
         from faao_mav.wire.protocol import MissionType
 
-        lists = {part: mock.lists.items(part) for part in MissionType}
-        if not self._told:
-            self._told = self._seen = lists
-        if lists != self._seen:
-            self._seen, self._changed = lists, time.monotonic()
+        now: dict[str, object] = {part.title: mock.lists.items(part) for part in MissionType}
+        now["armed"] = mock.armed
+        self._told = self._told or now
+        if now != self._seen:
+            self._seen, self._changed = now, time.monotonic()
         elif time.monotonic() > self._changed + _REST:
-            self.finish()
-        if mock.armed != self._armed:
-            self._armed = mock.armed
-            typer.echo("armed" if self._armed else "disarmed")
+            self.tell()
 
-    def finish(self) -> None:
+    def tell(self) -> None:
         """Print what has been seen and not told."""
-        for part, items in self._seen.items():
-            if items != self._told[part]:
-                typer.echo(f"{part.title}: {len(items)} rows")
+        for name, value in self._seen.items():
+            if value != self._told[name]:
+                rows = f"{name}: {len(value)} rows" if isinstance(value, tuple) else ""
+                typer.echo(rows or ("armed" if value else "disarmed"))
         self._told = self._seen

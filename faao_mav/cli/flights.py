@@ -3,7 +3,7 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -27,12 +27,6 @@ from faao_mav.cli.shared import (
 )
 from faao_mav.errors import InputError
 from faao_mav.files import write_whole
-
-if TYPE_CHECKING:
-    from faao_mav.autopilot import Track
-    from faao_mav.fly.seen import Flight
-    from faao_mav.mission.formats import MissionFile
-    from faao_mav.optimizer.solution import Solution
 
 
 @with_link
@@ -75,12 +69,16 @@ def fly(
     Exit status: 0 the mission was flown to its end; 1 it was not, or that is not known; 2 unusable
     arguments or input.
     """
+    from faao_mav.autopilot.files import made_for
+    from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.fly.fly import fly_mission
     from faao_mav.fly.radio import Radios
+    from faao_mav.fly.seen import Flight
     from faao_mav.fly.telemetry import POSITION_RATE
     from faao_mav.fly.telling import HEADER, Telling, as_text
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.summary import joined
+    from faao_mav.validate.check import predicted
 
     begun = False
 
@@ -99,12 +97,20 @@ def fly(
     file = read_noted(mission_file)
     solution = planned(plan_file, solution_file)
     radios = Radios(solution, radio) if solution is not None and radio is not None else None
-    flight = _flight(mission_file, file, solution, streamed=stream)
-    track = None if stream else _predicted(flight)
+    plan = solution.plan if solution is not None else None
+    vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
+    whose = made_for(mission_file, file, plan.aircraft if plan is not None else None)
+    flight = Flight(file.mission, vehicle, whose, solution, stream)
+    track = None
+    if not stream:
+        wind = plan.wind if plan is not None else (0.0, 0.0)
+        track, reason = predicted(file.mission, vehicle, wind)
+        if track is None:
+            note(f"the flight is not predicted: {reason}")
     telling = Telling(solution, track, radios, say)
     rate = rate if stream else POSITION_RATE
-    if radios is not None and solution is not None:  # two positions for each slot at least
-        rate = max(rate, 2 / solution.plan.flight.time_step)
+    if radios is not None and plan is not None:  # two positions for each slot at least
+        rate = max(rate, 2 / plan.flight.time_step)
     report = fly_mission(
         flight,
         to,
@@ -135,31 +141,6 @@ def fly(
         note("the vehicle holds another mission than the file: upload it first")
     if ending is None or ending.kind != "finished":
         raise typer.Exit(1)
-
-
-def _flight(
-    mission_file: Path, file: "MissionFile", solution: "Solution | None", *, streamed: bool
-) -> "Flight":
-    """Return what is to be flown, and what tells for whom and for which parameters it was made."""
-    from faao_mav.autopilot.files import made_for
-    from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.fly.seen import Flight
-
-    plan = solution.plan if solution is not None else None
-    vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
-    whose = made_for(mission_file, file, plan.aircraft if plan is not None else None)
-    return Flight(file.mission, vehicle, whose, solution, streamed)
-
-
-def _predicted(flight: "Flight") -> "Track | None":
-    """Return the predicted flight of the mission; None, which is noted, if there is none."""
-    from faao_mav.validate.check import predicted
-
-    wind = flight.solution.plan.wind if flight.solution is not None else (0.0, 0.0)
-    track, reason = predicted(flight.mission, flight.vehicle, wind)
-    if track is None:
-        note(f"the flight is not predicted: {reason}")
-    return track
 
 
 @exit_status()
