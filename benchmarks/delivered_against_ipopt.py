@@ -16,14 +16,13 @@ import argparse
 import os
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
 import numpy as np
-from peer import Model, at_best, curve, peer_starts
+from peer import Model, at_best, curve, peer_starts, sample
 
 from faao_mav.optimizer import direct
 from faao_mav.optimizer.design import design
@@ -32,10 +31,8 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.rates.table_rate import TableRate
-from faao_mav.plan import Plan, parse_plan
-from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+from faao_mav.plan import Plan
 
-MISSIONS = Path(__file__).parents[1] / "missions"
 PATIENCE = 60.0
 """Processor seconds that the peer may take for one start."""
 
@@ -84,29 +81,6 @@ PLANS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("paper_active", {"flight.duration": 50, "radio.gain": {"elevation_db": [0, -20, 10]}}),
     ("paper_active", {"flight.duration": 100, "power": 10}),
 )
-
-
-def plan(name: str, changes: dict[str, Any]) -> Plan:
-    """Read a sample plan for the direct method and the queue, with some keys replaced."""
-    source = MISSIONS / f"{name}.yaml"
-    data = load_yaml(source.read_text(), name)
-    data.setdefault("optimizer", {})["method"] = "direct"
-    data["radio"]["causal"] = True
-    for key, value in changes.items():
-        if key == "power":
-            data["radio"]["base_station"]["power_dbm"] = value
-            data["radio"]["relay"]["power_dbm"] = value
-            continue
-        if key == "antennas":
-            for station in ("base_station", "relay", "ground_user"):
-                data["radio"][station]["antennas"] = value
-            continue
-        *parents, last = key.split(".")
-        section = data
-        for parent in parents:
-            section = section[parent]
-        section[last] = value
-    return parse_plan(dump_yaml(data), str(source))
 
 
 def by_ipopt(problem: Problem, field: RateField, random: int) -> tuple[float, list[float]]:
@@ -179,7 +153,7 @@ def main() -> None:
     print(f"{'plan':68}" + "".join(f"{head:>{width}}" for head, width in heads))
     above, ratios = np.inf, []
     for name, changes in rows:
-        read = plan(name, changes)
+        read = sample(name, {"radio.causal": True} | changes)
         problem = build_problem(read)
         optimize(read)  # fills the tables that are kept
         ours, took, whole = by_direct(read)

@@ -13,7 +13,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +22,24 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import numpy as np
-from peer import GAIN, ROUNDS, Model, at_best, at_precoders, peer_starts
+from peer import GAIN, ROUNDS, Model, at_best, at_precoders, peer_starts, sample
 from random_flights import random_flight
 
 from faao_mav.arrays import Real
 from faao_mav.errors import PlanError
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import maximize, objective
+from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
-from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.rates.slot_rate import FixedRate
-from faao_mav.optimizer.search.bound import Bound, upper_bound
-from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.plan import Plan, parse_plan
-from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.bound import upper_bound
+from faao_mav.plan import Plan
 
-MISSIONS = Path(__file__).parents[1] / "missions"
+KEYS = (
+    {"T": "flight.duration", "dt": "flight.time_step", "W": "power"}
+    | {key: f"radio.{key}" for key in ("modulation", "fading", "causal", "duplex", "gain")}
+    | {"starts": "optimizer.starts"}
+)
 PATIENCE = 30.0
 """Seconds that the peer may take for one start."""
 FLIGHTS = 10_000
@@ -48,33 +49,15 @@ claims: list[tuple[str, bool, str]] = []
 
 
 def plan(name: str, **changes: Any) -> Plan:
-    """Read a sample plan with `T`, `W`, `dt`, `modulation`, `fading` or `starts` replaced."""
-    data = load_yaml((MISSIONS / f"{name}.yaml").read_text(), "test")
-    data.setdefault("optimizer", {})["method"] = "direct"
-    data["radio"]["causal"] = False  # the peers maximise R_avg
-    for key, value in changes.items():
-        if key == "T":
-            data["flight"]["duration"] = value
-        elif key == "dt":
-            data["flight"]["time_step"] = value
-        elif key == "W":
-            data["radio"]["base_station"]["power_dbm"] = value
-            data["radio"]["relay"]["power_dbm"] = value
-        elif key == "starts":
-            data["optimizer"]["starts"] = value
-        else:
-            data["radio"][key] = value
-    return parse_plan(dump_yaml(data))
+    """Read a sample plan; the peers maximise R_avg."""
+    return sample(name, {"radio.causal": False} | {KEYS.get(k, k): v for k, v in changes.items()})
 
 
-def timed(work: Callable[[], Any], times: int = 1) -> tuple[Any, float]:
-    """Run `work` and return its result and the least of its times, s."""
-    found, best = None, np.inf
-    for _ in range(times):
-        started = time.perf_counter()
-        found = work()
-        best = min(best, time.perf_counter() - started)
-    return found, float(best)
+def timed(work: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
+    """Run `work` and return its result and its time, s."""
+    started = time.perf_counter()
+    found = work(*arguments)
+    return found, time.perf_counter() - started
 
 
 def best_rate(problem: Problem, w: Real) -> float:
@@ -116,21 +99,6 @@ def by_ipopt(problem: Problem, random: int) -> float:
     return best
 
 
-def rate_of(read: Plan) -> float:
-    """R_avg by the plan's method."""
-    return optimize(read).rates.R_avg
-
-
-def peer_rate(read: Plan, random: int) -> float:
-    """R_avg by IPOPT, the building of its model included."""
-    return by_ipopt(build_problem(read), random)
-
-
-def bound_of(read: Plan, reached: float) -> Bound:
-    """What no route can exceed, where a plan has `reached` so much."""
-    return upper_bound(build_problem(read), reached)
-
-
 def quality(quick: bool, random: int) -> None:
     """R_avg and whole times on every scenario."""
     print(f"{'scenario':28}{'direct':>9}{'s':>7}{'Alg. 1':>9}{'s':>7}{'IPOPT':>9}{'s':>7}")
@@ -155,16 +123,15 @@ def quality(quick: bool, random: int) -> None:
         rows.append(("10,000 slots, straight start", long, False, True))
     above_paper, above_peer, speedup = np.inf, np.inf, 0.0
     for name, read, with_paper, with_peer in rows:
-        solution, seconds = timed(partial(optimize, read))
+        solution, seconds = timed(optimize, read)
         ours = solution.rates.R_avg
         line = f"{name:28}{ours:9.4f}{seconds:7.2f}"
         paper = None
         if with_paper:
             paper_plan = read.changed({"optimizer.method": "algorithm1"})
-            try:
-                paper, took = timed(partial(rate_of, paper_plan))
-            except PlanError:
-                paper = None
+            with suppress(PlanError):
+                found, took = timed(optimize, paper_plan)
+                paper = found.rates.R_avg
         if paper is None:
             line += f"{'-':>9}{'-':>7}"
         else:
@@ -173,7 +140,7 @@ def quality(quick: bool, random: int) -> None:
             if name == "paper_active T=50 W=20":
                 speedup = took / seconds
         if with_peer:
-            peer, took = timed(partial(peer_rate, read, random))
+            peer, took = timed(by_ipopt, build_problem(read), random)
             line += f"{peer:9.4f}{took:7.2f}"
             above_peer = min(above_peer, ours - peer)
         print(line, flush=True)
@@ -182,66 +149,6 @@ def quality(quick: bool, random: int) -> None:
     claims.append(("at least Algorithm 1", above_paper >= -1e-4, f"least gain {above_paper:.1e}"))
     claims.append(("at least IPOPT's best", above_peer >= -1e-4, f"least gain {above_peer:.1e}"))
     claims.append(("100 times Algorithm 1's speed", speedup >= 100, f"{speedup:.1f} times"))
-
-
-def fixed_precoders(quick: bool) -> None:
-    """The trajectory problem alone, from the straight flight."""
-    print(f"\n{'fixed precoders':28}{'direct':>9}{'s':>8}{'IPOPT':>9}{'s':>8}{'ratio':>7}")
-    cases: list[dict[str, Any]] = [{"T": 10}, {"T": 50}]
-    if not quick:
-        cases += [{"T": 100}, {"T": 150}, {"W": 0}, {"W": 10}, {"modulation": "qpsk"}]
-        cases.append({"T": 500, "dt": 0.05})
-    ratios = {}
-    for case in cases:
-        problem = build_problem(plan("paper_active", **case))
-        kin, flight = problem.kinematics, straight_flight(problem.kinematics)
-        precoders = []
-        for link in problem.links:
-            H = link.channel(flight.w, link.small_scale(flight.w))
-            precoders.append(link.best(H[:, None]))
-        pairs = list(zip(problem.links, precoders, strict=True))
-
-        def own(
-            pairs: Any = pairs, kin: Any = kin, flight: Any = flight, problem: Any = problem
-        ) -> Any:
-            held = tuple(FixedRate(k, P) for k, P in pairs)  # these samples have no steering
-            field = RateField(problem.links, held)
-            return maximize(kin, field, flight, tolerance=1e-6).trajectory
-
-        def other(pairs: Any = pairs, kin: Any = kin, flight: Any = flight) -> Any:
-            rates = [at_precoders(k, flight.w, P) for k, P in pairs]
-            return Model(kin, rates, PATIENCE).solve(rates, flight)
-
-        many = 1 if kin.slots > 1000 else 3
-        ours, seconds = timed(own, many)
-        theirs, took = timed(other, many)
-        values = [
-            min(k.rates(f.w, k.small_scale(f.w), P).mean() for k, P in pairs)
-            for f in (ours, theirs)
-        ]
-        name = " ".join(f"{k}={v}" for k, v in case.items())
-        ratios[name] = took / seconds
-        print(
-            f"{name:28}{values[0]:9.4f}{seconds:8.3f}{values[1]:9.4f}{took:8.3f}"
-            f"{took / seconds:7.1f}",
-            flush=True,
-        )
-    least = min(ratios.values())
-    claims.append(("fixed precoders: quicker than IPOPT", least > 1, f"least ratio {least:.1f}"))
-    named = {k: r for k, r in ratios.items() if k in ("T=50", "T=150")}
-    claims.append(
-        ("fixed precoders: twice at T = 50, 150", min(named.values()) >= 2,
-         ", ".join(f"{k}: {r:.1f}" for k, r in named.items()))
-    )  # fmt: skip
-
-
-def growth() -> None:
-    """Time and memory by the number of slots."""
-    print(f"\n{'slots':>8}{'s':>8}{'us/slot':>9}")
-    for slots in (250, 1000, 2500, 5000, 10_000):
-        read = plan("paper_active", dt=50 / slots, starts=["straight"])
-        _, seconds = timed(partial(optimize, read))
-        print(f"{slots:8}{seconds:8.2f}{1e6 * seconds / slots:9.0f}", flush=True)
 
 
 def best_of_others(read: Plan, count: int) -> float:
@@ -282,7 +189,7 @@ def bound(quick: bool) -> None:
         read = plan(name, **changes)
         solution = optimize(read)
         reached = solution.delivered_rate if read.radio.causal else solution.rates.R_avg
-        found, seconds = timed(partial(bound_of, read, reached))
+        found, seconds = timed(upper_bound, build_problem(read), reached)
         gaps.append(100 * (found.value / reached - 1))
         above.append(best_of_others(read, -(-FLIGHTS // len(rows))) / found.value)
         row = " ".join([name, *(f"{key}={value}" for key, value in changes.items())])
@@ -302,9 +209,6 @@ def main() -> None:
     quick = options.quick
     quality(quick, options.random)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    fixed_precoders(quick)
-    if not quick:
-        growth()
     bound(quick)
     print(f"\nmemory up to the first table's end, peer included: {memory:.2f} GB")
     for claim, met, figure in claims:

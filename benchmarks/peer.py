@@ -7,8 +7,9 @@ numbers c of every slot alone: with H = sqrt(g) H_r every exponent of (7), (8) i
 that one model with c as its parameter serves all starts and all precoders.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -20,13 +21,28 @@ from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.starts import starts
+from faao_mav.plan import Plan, read_plan
 from faao_mav.radio.gain import PathGain
 from faao_mav.radio.relay import RelayQueue
+
+MISSIONS = Path(__file__).parents[1] / "missions"
+
+EACH = {
+    "power": tuple(f"radio.{end}.power_dbm" for end in ("base_station", "relay")),
+    "antennas": tuple(f"radio.{end}.antennas" for end in ("base_station", "relay", "ground_user")),
+}
+"""Keys that stand for the same key of several ends."""
 
 LENGTH = 100.0
 TOLERANCE = 1e-7
 ROUNDS, GAIN = 6, 1e-5
 """Alternation of IPOPT and best precoders: at most so many rounds, the least gain of R_avg."""
+
+
+def sample(name: str, changes: Mapping[str, Any]) -> Plan:
+    """Return a sample plan for the direct method with the values at some dotted keys replaced."""
+    wide = {path: value for key, value in changes.items() for path in EACH.get(key, (key,))}
+    return read_plan(MISSIONS / f"{name}.yaml").changed({"optimizer.method": "direct"} | wide)
 
 
 @dataclass(frozen=True)

@@ -191,87 +191,57 @@ class Iterate:
 
 @dataclass(frozen=True, slots=True)
 class Direction:
-    """Changes of an `Iterate`."""
+    """Changes of an `Iterate`, and `bend`, dx^T H dx."""
 
     x: Real
     y: Real
     s: Real
     z: Real
     floor: float
+    bend: float
 
 
-class Newton:
-    """The factored system at an iterate, with a proximal term; `curvature` (k, k, n) is its H.
+def newton_direction(system: System, iterate: Iterate, mu: float, proximal: float) -> Direction:
+    """Return the direction to complementarities of mu, held back by a `proximal` term.
 
-    Raises `numpy.linalg.LinAlgError` where it is singular.
+    Raises `numpy.linalg.LinAlgError` where the system is singular.
     """
-
-    def __init__(self, system: System, iterate: Iterate, proximal: float) -> None:
-        self.system, self.iterate = system, iterate
-        at, chain = iterate.at, system.chain
-        weights = iterate.z / iterate.s
-        stiff = system.stiffness(at, weights)
-        held = np.zeros((len(at.x), len(at.x), 1))
-        held[system.held, system.held] = proximal
-        whole = system.curvature(at, iterate.z)
-        self.curvature = _convex_part(chain, whole, stiff + held) + held
-        solve = chain.factored(self.curvature + stiff)
-        if solve is None:
-            raise np.linalg.LinAlgError("singular")
-        self._solve: Callable[[Real], Real] = solve
-        k, n = at.x.shape
-        sums = len(at.slopes)
-        right = np.zeros((sums + 1, k + len(chain.after), n))
-        right[:sums, :k] = at.slopes
-        right[sums, :k] = system.objective + self._pushed(weights * iterate.margin)
-        right[sums, k:, :-1] = -chain.missed(at.x)
-        self._columns = solve(right)
-        border = np.zeros((sums + 1, sums + 1))
-        border[:sums, :sums] = np.einsum("ikn,jkn->ij", at.slopes, self._columns[:sums, :k])
-        border[range(sums), range(sums)] += 1 / weights[system.first_sum :]
-        rewards = system.floored[system.first_sum :]
-        border[:sums, sums], border[sums, :sums] = -1.0 * rewards, rewards
-        border[sums, sums] = not rewards.any()
-        self._border = border
-
-    def predictor(self) -> Direction:
-        """Return the direction to targets of zero."""
-        return self._direction(self._columns[-1], np.zeros_like(self.iterate.s))
-
-    def corrector(self, mu: float, ahead: Direction, share: float) -> Direction:
-        """Return the direction to mu, corrected by `share` of `ahead` (Mehrotra)."""
-        system, iterate = self.system, self.iterate
-        correction = np.where(np.arange(len(ahead.s)) < system.first_sum, share**2, 0.0)
-        target = (system.weight * mu - correction * ahead.s * ahead.z) / iterate.s
-        right = np.zeros((1, *self._columns.shape[1:]))
-        right[0, : len(iterate.at.x)] = self._pushed(target)
-        return self._direction(self._columns[-1] + self._solve(right)[0], target)
-
-    def _pushed(self, z: Real) -> Real:
-        """Return J^T z of the inequalities in slots, (k, n)."""
-        in_slots = np.where(np.arange(len(z)) < self.system.first_sum, z, 0.0)
-        return self.system.pull(self.iterate.at, in_slots)
-
-    def _direction(self, alone: Real, target: Real) -> Direction:
-        """Return the direction that is `alone` without the multipliers of sums."""
-        system, iterate = self.system, self.iterate
-        at, k = iterate.at, len(iterate.at.x)
-        sums = len(at.slopes)
-        first = system.first_sum
-        weights = iterate.z / iterate.s
-        right = np.append((target / weights + iterate.margin)[first:], float(system.goal.total))
-        right[:sums] -= np.einsum("tkn,kn->t", at.slopes, alone[:k])
-        solved = np.linalg.solve(self._border, right)
-        both = alone + np.einsum("t,tkn->kn", solved[:sums], self._columns[:sums])
-        x, y, rise = both[:k], both[k:, :-1], float(solved[-1])
-        s = system.along(at, x) - iterate.margin - rise * system.floored
-        z = target - weights * s
-        z[first:] = solved[:sums]
-        return Direction(x, y - iterate.y, s, z - iterate.z, rise)
-
-    def bend(self, direction: Direction) -> float:
-        """Return dx^T H dx of a `direction`."""
-        return float(np.einsum("in,ijn,jn->", direction.x, self.curvature, direction.x))
+    at, chain, first = iterate.at, system.chain, system.first_sum
+    (k, n), sums = at.x.shape, len(at.slopes)
+    weights = iterate.z / iterate.s
+    target = system.weight * mu / iterate.s
+    stiff = system.stiffness(at, weights)
+    held = np.zeros((k, k, 1))
+    held[system.held, system.held] = proximal
+    H = _convex_part(chain, system.curvature(at, iterate.z), stiff + held) + held
+    solve = chain.factored(H + stiff)
+    if solve is None:
+        raise np.linalg.LinAlgError("singular")
+    # columns of the sums, then what is moved without them
+    right = np.zeros((sums + 1, k + len(chain.after), n))
+    right[:sums, :k] = at.slopes
+    pushed = target + weights * iterate.margin
+    pushed[first:] = 0.0
+    right[sums, :k] = system.objective + system.pull(at, pushed)
+    right[sums, k:, :-1] = -chain.missed(at.x)
+    solved = solve(right)
+    columns, alone = solved[:sums], solved[sums]
+    border = np.zeros((sums + 1, sums + 1))
+    border[:sums, :sums] = np.einsum("ikn,jkn->ij", at.slopes, columns[:, :k])
+    border[range(sums), range(sums)] += 1 / weights[first:]
+    rewards = system.floored[first:]
+    border[:sums, sums], border[sums, :sums] = -1.0 * rewards, rewards
+    border[sums, sums] = not rewards.any()
+    missing = np.append((target / weights + iterate.margin)[first:], float(system.goal.total))
+    missing[:sums] -= np.einsum("tkn,kn->t", at.slopes, alone[:k])
+    of_sums = np.linalg.solve(border, missing)
+    both = alone + np.einsum("t,tkn->kn", of_sums[:sums], columns)
+    x, y, rise = both[:k], both[k:, :-1], float(of_sums[-1])
+    s = system.along(at, x) - iterate.margin - rise * system.floored
+    z = target - weights * s
+    z[first:] = of_sums[:sums]
+    bend = float(np.einsum("in,ijn,jn->", x, H, x))
+    return Direction(x, y - iterate.y, s, z - iterate.z, rise, bend)
 
 
 def _convex_part(chain: Chain, whole: Real, more: Real) -> Real:

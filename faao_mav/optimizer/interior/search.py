@@ -1,9 +1,9 @@
 """The iteration of the interior-point method.
 
 Lifecycle: `Search(...)` once, from a start; `run` iterates. An iteration measures the residual,
-factors the Newton system, takes the predictor's reach to choose the barrier parameter mu (Mehrotra)
-and tries the corrector's direction. One that is refused is tried anew with a proximal term;
-iterates that hug the limits are given multipliers from a larger mu.
+lowers the barrier parameter mu where the iterate has come near to its optimum and tries the Newton
+direction. One that is refused is tried anew with a proximal term; iterates that hug the limits are
+given multipliers from a larger mu.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,13 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, V
-from faao_mav.optimizer.interior.newton import Direction, Functions, Iterate, Newton, System
+from faao_mav.optimizer.interior.newton import (
+    Direction,
+    Functions,
+    Iterate,
+    System,
+    newton_direction,
+)
 from faao_mav.optimizer.interior.rewards import Goal
 from faao_mav.optimizer.kinematics import Kinematics
 
@@ -36,14 +42,10 @@ _MAX_ATTEMPTS = 6
 _FIRST_PROXIMAL, _MORE_PROXIMAL = 1e-3, 8.0
 """The first proximal term, and by how much the next one is larger. Chosen."""
 
-_SLOWEST = 0.3
-"""The least share of the mean gap that mu falls to in a step. On 19 flights of the tests 0.3 takes
-473 iterations, 0.1 534 and 0.4 517."""
-
 _FALL, _SOLVED = 0.2, 1.0
-"""Where mu waits for the iterates, it falls to this share when the scaled gradient is below so many
-mu. Measured on nine random plans with a least speed: with 3 and 10 mu one and four do not converge.
-"""
+"""mu falls to this share when the scaled gradient is below so many mu. Measured on nine random
+plans with a least speed: with 3 and 10 mu one and four do not converge. Choosing mu by how far a
+step to mu = 0 reaches (Mehrotra) ends as high, in as much time, but not where flights may turn."""
 
 _LEAST_GAP = 0.25
 """The complementarity gap per slot at the least mu, in tolerances. Chosen."""
@@ -117,8 +119,6 @@ class Search:
         self.goal, self.tolerance, self.mu = goal, tolerance, strategy.mu
         x = np.concatenate([x, goal.begin(cold=strategy.room >= 1)])
         self.system = system = System(Grid.of(kin), goal, constraints, x)
-        # where half-planes turn, or a flight may turn as a whole, mu waits for the iterates
-        self.waits = kin.min_speed > 0 or bool(system.turns.any())
         at = system.at(x)
         s = np.maximum(at.values, strategy.room * system.headroom)
         y = np.zeros((len(system.chain.after), kin.slots - 1))
@@ -189,16 +189,15 @@ class Search:
         self.iterations += fresh
         share = 0.0
         try:
-            newton = Newton(self.system, self.iterate, self.proximal * self.steepness)
-            ahead = newton.predictor()
-            self._choose_mu(slope, ahead)
-            direction = newton.corrector(self.mu, ahead, min(1.0, self._reach(ahead)))
+            self._lower_mu(slope)
+            proximal = self.proximal * self.steepness
+            direction = newton_direction(self.system, self.iterate, self.mu, proximal)
         except np.linalg.LinAlgError:
             self.attempts = _MAX_ATTEMPTS
         else:
             share = self._share(direction)
-            if not self._accept(newton, direction, share):
-                share = share / 2 if self._accept(newton, direction, share / 2) else 0.0
+            if not self._accept(direction, share):
+                share = share / 2 if self._accept(direction, share / 2) else 0.0
             # short steps of shares of the band lead to saddles: they are held back more
             if share == 0 or (share < _SHORT and self.goal.held):
                 self.proximal = max(_MORE_PROXIMAL * self.proximal, _FIRST_PROXIMAL)
@@ -219,21 +218,12 @@ class Search:
         most = 1 / np.sqrt(max(missed, TINY))
         return float(min(1.0, _TO_BOUNDARY * self._reach(direction), most))
 
-    def _choose_mu(self, slope: float, ahead: Direction) -> None:
-        """Choose mu by how far the direction `ahead` for mu = 0 reaches, or wait."""
-        it = self.iterate
-        if self.waits:
-            solved = slope * self.steepness < _SOLVED * self.mu or slope < self.tolerance
-            self.mu *= _FALL if solved else 1.0
-        else:
-            now, reach = self._mean_gap(it.s, it.z), min(1.0, self._reach(ahead))
-            left = self._mean_gap(it.s + reach * ahead.s, it.z + reach * ahead.z)
-            self.mu = min(self.mu, max((left / now) ** 3, _SLOWEST) * now)
-        per_slot = float(self.system.weight.sum()) / it.at.x.shape[1]
-        self.mu = max(self.mu, self.tolerance * _LEAST_GAP * self.steepness / per_slot)
-
-    def _mean_gap(self, s: Real, z: Real) -> float:
-        return float((s * z).sum() / self.system.weight.sum())
+    def _lower_mu(self, slope: float) -> None:
+        """Lower mu where the scaled gradient `slope` tells that the iterate is near its optimum."""
+        solved = slope * self.steepness < _SOLVED * self.mu or slope < self.tolerance
+        per_slot = float(self.system.weight.sum()) / self.iterate.at.x.shape[1]
+        least = self.tolerance * _LEAST_GAP * self.steepness / per_slot
+        self.mu = max(self.mu * (_FALL if solved else 1.0), least)
 
     def _reach(self, step: Direction) -> float:
         """Return the share of `step` at which a slack or a multiplier vanishes."""
@@ -241,7 +231,7 @@ class Search:
         falls = max(float((-step.s / it.s).max()), float((-step.z / it.z).max()))
         return 1 / max(falls, TINY)
 
-    def _accept(self, newton: Newton, step: Direction, share: float) -> bool:
+    def _accept(self, step: Direction, share: float) -> bool:
         """Move unless the functions fall short of the model."""
         system, it = self.system, self.iterate
         if not np.isfinite(step.x).all():
@@ -253,9 +243,8 @@ class Search:
         margin = s - at.values + (it.floor + share * step.floor) * system.floored
         more = z * (margin - (1 - share) * it.margin)
         missing = float(more[~system.turns].sum())
-        bend = newton.bend(step)
-        decrease = bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
-        missing -= share**2 / 2 * bend
+        decrease = step.bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
+        missing -= share**2 / 2 * step.bend
         if not decrease > 0 or missing > _MISFIT * share * decrease + self.goal.noise:
             return False
         # half-planes that turn: what they leave is the slack, but for the margin that is left
@@ -271,7 +260,10 @@ class Search:
     def _centre(self) -> None:
         """Give the iterate multipliers from a larger mu: that leads away from limits."""
         it = self.iterate
-        self.mu = min(COLD_START.mu * self.steepness, _CENTRING * self._mean_gap(it.s, it.z))
+        self.mu = min(
+            COLD_START.mu * self.steepness,
+            _CENTRING * float(it.s @ it.z / self.system.weight.sum()),
+        )
         floor, s = self._floor(it.at, it.s)
         z = np.where(self.system.floored, it.z, self.system.weight * self.mu / s)
         self.iterate = replace(it, s=s, z=z, floor=floor)
