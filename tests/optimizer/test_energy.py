@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from certificate import still_gained
 from random_flights import random_flight
 
 from faao_mav.errors import InfeasibleError
@@ -157,14 +156,3 @@ def test_too_little_energy_says_what_the_straight_flight_takes() -> None:
         InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
     ):
         within(0.2)
-
-
-def test_the_kkt_residual_knows_the_energy() -> None:
-    found = within(0.9 * used(direct(build_problem(COPTER))))
-    assert found.residuals()["energy"] == 0
-    free, less = (
-        replace(found, problem=replace(found.problem, energy=share * found.problem.energy))
-        for share in (math.inf, 0.9)
-    )
-    assert still_gained(found) < 0.1 * still_gained(free)
-    assert not less.is_feasible(1e-5)

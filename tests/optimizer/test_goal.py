@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_flights import random_flight
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import least_number
-from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.search.multistart import paced
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.fields import dbm
 from faao_mav.report.summary import result_lines
@@ -42,12 +39,6 @@ def delivered(changes: dict[str, Any]) -> float:
 def by_duration() -> dict[int, float]:
     """What flights of every duration deliver, bit/s/Hz."""
     return {slots: delivered({"flight.duration": slots}) for slots in range(12, 19)}
-
-
-def test_rate_and_data_grow_with_the_duration(by_duration: dict[int, float]) -> None:
-    rates = np.array(list(by_duration.values()))
-    assert (np.diff(rates) > -1e-4).all()
-    assert (np.diff(rates * list(by_duration)) > 0).all()
 
 
 @settings(max_examples=4, deadline=None)
@@ -124,20 +115,6 @@ def test_the_least_number_is_that_of_trying_all(
     if surplus[high] >= 0:
         least = next(n for n in range(1, high + 1) if surplus[n] >= 0)
         assert least_number(surplus.__getitem__, 0, high, -1.0, surplus[high]) == least
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.integers(0, 2**32), st.integers(0, 40), st.booleans())
-def test_a_flight_that_takes_longer_keeps_the_limits(seed: int, more: int, free: bool) -> None:
-    hover = None if free else np.zeros(2)
-    ends = (np.array([0.0, 60.0]), np.array([60.0, 0.0]))
-    short, long = (
-        Kinematics(*ends, slots, 0.5, 12.0, 4.0, hover, hover, True) for slots in (40, 40 + more)
-    )
-    flight = long.follow(paced(long, random_flight(short, seed), 0.5))
-    speed, acceleration = (np.linalg.norm(each, axis=1).max() for each in (flight.v, flight.a))
-    assert speed <= 12.0 * (1 + 1e-2)  # sampled anew, and led to the end
-    assert acceleration <= 4.0 * (1 + 1e-1)
 
 
 @pytest.mark.parametrize(

@@ -136,13 +136,6 @@ def test_what_surrounds_a_plan_speaks_of_it(small_plan: MakePlan, tmp_path: Path
     assert loaded.recomputed() == planned.rates
 
 
-def test_precoders_that_know_the_draw(small_plan: MakePlan) -> None:
-    draws = {"radio.fading_samples": 4, "radio.modulation": "bpsk", "power": 0}
-    each = optimize(plan_of(small_plan, draws | {"radio.csi": "instantaneous"}))
-    assert each.P_B.shape == (4, 20, 2, 2)
-    assert each.rates.R_avg > optimize(plan_of(small_plan, draws)).rates.R_avg
-
-
 def test_more_than_two_modes(small_plan: MakePlan) -> None:
     three = {f"radio.{end}.antennas": 3 for end in ("base_station", "relay", "ground_user")}
     few = {

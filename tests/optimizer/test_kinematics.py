@@ -68,11 +68,6 @@ def test_hover_to_hover_is_straight_and_even() -> None:
     assert speed.max() == pytest.approx(8.5, abs=0.1)
 
 
-def test_free_ends_fly_at_one_speed() -> None:
-    flight = straight_flight(make(start_velocity=None, end_velocity=None))
-    assert np.linalg.norm(flight.v, axis=1) == pytest.approx(np.hypot(50, 50) / 10)
-
-
 def test_an_end_velocity_that_cannot_be_met_is_infeasible() -> None:
     kin = make(start_velocity=np.array([20.0, 0.0]), end_velocity=np.zeros(2), slots=5)
     with pytest.raises(InfeasibleError, match="end velocities"):
@@ -105,24 +100,6 @@ def test_plans_that_are_accepted_can_be_flown(
         return
     kin = kinematics(plan)
     assert worst(kin, straight_flight(kin)) < 1e-6
-
-
-@given(st.integers(0, 2**32 - 1), st.booleans())
-def test_integration_meets_the_ends_and_the_dynamics(seed: int, given_end: bool) -> None:
-    rng = np.random.default_rng(seed)
-    kin = make(end_velocity=np.array([1.0, 2.0]) if given_end else None)
-    flight = kin.integrate(np.zeros(2), rng.standard_normal((21, 2)))
-    residuals = kin.residuals(flight)
-    del residuals["(13e) speed"], residuals["(13f) acceleration"]
-    assert max(residuals.values()) < 1e-9
-    assert (flight.a[-1] == 0).all()
-
-
-def test_integration_leaves_an_exact_flight_alone() -> None:
-    kin = make()
-    flight = straight_flight(kin)
-    again = kin.integrate(flight.v[0], flight.a)
-    assert again.w == pytest.approx(flight.w, abs=1e-9)
 
 
 def test_residuals_see_every_violation() -> None:

@@ -70,15 +70,6 @@ def test_every_start_keeps_the_least_speed(
         assert worst(kin, flight) < 1e-8
 
 
-@pytest.mark.parametrize("step", [0.2, 0.5, 2.0])
-@pytest.mark.parametrize("least", [3.0, 9.0, 14.0])
-@pytest.mark.parametrize("seconds", [60.0, 180.0, 900.0])
-def test_free_ends_always_have_a_start(seconds: float, least: float, step: float) -> None:
-    kin = cruiser(seconds, least, time_step=step)
-    for k in (kin, replace(kin, end=kin.start)):
-        assert worst(k, straight_flight(k)) < 1e-9
-
-
 def test_it_circles_at_the_stations() -> None:
     kin = cruiser(400, 10.0)
     flight = starts(kin, ["bs-user"], PLACES)["bs-user"]
@@ -122,18 +113,6 @@ def test_no_refusal_where_a_dubins_path_keeps_every_limit(
     )
     assert worst(kin, kin.follow(v)) < 1e-9
     assert worst(kin, straight_flight(kin)) < 1e-9
-
-
-@pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])
-def test_circles_turn_as_a_whole_until_the_search_has_converged(wind: Vector) -> None:
-    over_ground, through_air = (15.0 + math.hypot(*wind), 15.0) if any(wind) else (15.0, math.inf)
-    kin = cruiser(120, 12.0, time_step=1.0, max_speed=over_ground)
-    kin, stage = replace(kin, max_airspeed=through_air, wind=wind), links(bpsk, 4e4, 4e4)
-    start = starts(kin, ["bs-user"], PLACES)["bs-user"]
-    best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=80)
-    assert best.converged
-    assert worst(kin, best.trajectory) < 1e-8
-    assert best.value >= reward(stage, start)
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])
@@ -188,15 +167,6 @@ def test_the_optimum_keeps_the_least_speed(
         assert found.value >= reward(stage, flight) - 1e-12
         best = max(best, found.value)
     assert 0.93 * hovering < best < 1.001 * hovering
-
-
-def test_a_least_speed_that_does_not_bind_costs_nothing() -> None:
-    kin, stage = cruiser(25, 5.0, **AT_ONCE), links(gaussian, 1e5, 1e5)
-    free = maximize(replace(kin, min_speed=0.0), stage, straight_flight(kin))
-    assert np.linalg.norm(free.trajectory.v, axis=1).min() > 5
-    best = maximize(kin, stage, straight_flight(kin))
-    assert best.converged
-    assert best.value == pytest.approx(free.value, rel=1e-5)
 
 
 def test_the_published_flight_is_reached() -> None:
@@ -283,7 +253,3 @@ def test_plans_that_cannot_be_are_refused(changes: dict[str, Any], parts: list[s
     message = str(caught.value)
     assert message.startswith("small.yaml: ")
     assert [part for part in parts if part not in message] == []
-
-
-def test_a_plan_reads_the_least_speed(small_plan: MakePlan) -> None:
-    assert small_plan({"vehicle.min_speed": 4.0, **FREE}).vehicle.min_speed == 4

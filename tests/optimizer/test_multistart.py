@@ -7,7 +7,7 @@ import pytest
 from conftest import MISSIONS, MakePlan, edited
 
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize
+from faao_mav.optimizer.interior.maximize import LocalOptimum
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import optimize
@@ -16,7 +16,6 @@ from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search import multistart
 from faao_mav.optimizer.search.multistart import (
     COARSE_SLOTS,
-    FEWEST_SLOTS,
     BlockStage,
     improve_starts,
 )
@@ -80,20 +79,6 @@ def test_what_is_rejected_would_not_have_won(power: int) -> None:
     assert all(solution.starts[name] <= solution.rates.R_avg for name in dropped)
     for flight in improved.values():
         assert max(problem.kinematics.residuals(flight).values()) < 1e-7
-
-
-def test_short_flights_are_improved_as_they_are(small_plan: MakePlan) -> None:
-    plan = small_plan()
-    problem = build_problem(plan)
-    kin, field = problem.kinematics, rate_field(problem, design(plan))
-    assert kin.slots < FEWEST_SLOTS
-    routes = starts_of(problem)
-    improved, _ = improve_starts(problem, field, routes, 50)
-    for name, flight in routes.items():
-        alone = maximize(
-            kin, field, flight, tolerance=1e-3, max_iterations=50, relay=problem.maximised_queue
-        )
-        assert improved[name].w == pytest.approx(alone.trajectory.w, abs=1e-6)
 
 
 def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(

@@ -88,25 +88,6 @@ def test_a_local_optimum_of_what_is_delivered(
     assert gain < 0.02 * kkt_residual(kin, stage, start, relay=relay)
 
 
-def test_the_residual_is_a_gain_that_can_be_had() -> None:
-    """Where a flight is no optimum, a better one is found; at the optimum there is none."""
-    kin, start = copter(100, time_step=0.5), straight_flight(copter(100, time_step=0.5))
-    for relay in (FULL, HALF):
-        early = maximize(kin, ACTIVE, start, relay=relay, max_iterations=4)
-        best = maximize(kin, ACTIVE, start, relay=relay, max_iterations=200)
-        assert best.value > early.value
-        assert kkt_residual(kin, ACTIVE, early.trajectory, relay=relay) > 1e-4
-        assert kkt_residual(kin, ACTIVE, best.trajectory, relay=relay) < 2e-5
-
-
-def test_flat_rates_leave_the_start_as_it_is() -> None:
-    kin = plane(50)
-    start = straight_flight(kin)
-    best = maximize(kin, links(bpsk, 1e9, 1e9), start, relay=FULL)
-    assert best.trajectory is start
-    assert best.value == pytest.approx(2 * (1 - 1 / kin.slots))
-
-
 @dataclass(frozen=True)
 class Known:
     """What CasADi + IPOPT delivers on the copter's sample (benchmarks)."""

@@ -53,8 +53,3 @@ def test_plans_with_other_stations_share_their_tables(monkeypatch: pytest.Monkey
     assert len(made) == 1  # both links have it
     rough_flight(parse_plan(edited(BASE, {"radio.relay.power_dbm": 30})))
     assert len(made) == 2
-
-
-def test_a_flight_of_another_length_is_no_start() -> None:
-    plan = parse_plan(BASE)
-    assert rough_flight(plan, np.zeros((5, 2))).w.shape == (28, 2)

@@ -31,20 +31,6 @@ def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:
     )
 
 
-def test_xi_is_that_of_16(paper_plan: MakePlan) -> None:
-    problem = build_problem(paper_plan())
-    w = straight_flight(problem.kinematics).w
-    found = xi(sums_of(problem), w)
-    xis = []
-    for link in problem.links:
-        H = link.channel(w, link.small_scale(w)) * np.sqrt(link.power / 2)
-        x = np.array([[a, b] for a in (1, -1) for b in (1, -1)])
-        u = (x[:, None] - x).reshape(-1, 2)
-        D = np.sum(np.abs(np.einsum("nrt,kt->nkr", H, u)) ** 2, axis=2) / (4 * link.noise)
-        xis.append(np.exp(-D).sum() - 2 * len(w) * 2)  # O = 2 (N + 2) N_t log2 rho
-    assert found == pytest.approx(max(xis), rel=1e-9)
-
-
 @pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
 @pytest.mark.parametrize("power", [-10, 10, 20])
 def test_xi_never_increases_and_the_flight_stays_feasible(
@@ -64,24 +50,6 @@ def test_xi_never_increases_and_the_flight_stays_feasible(
     assert xi(sums, flight.w) < xi(sums, start.w)
     assert xi(sums, optimize_trajectory(problem, sums, flight).w) <= xi(sums, flight.w)
     assert max(problem.kinematics.residuals(flight).values()) < 1e-6
-
-
-def test_27_reaches_a_stationary_point(paper_plan: MakePlan) -> None:
-    """No feasible move of the whole flight lowers xi: checked without the solver."""
-    problem = build_problem(paper_plan())
-    kin, sums = problem.kinematics, sums_of(problem)
-    flight = optimize_trajectory(problem, sums, straight_flight(kin))
-    best = xi(sums, flight.w)
-    rng = np.random.default_rng(0)
-    gains = []
-    for _ in range(200):
-        other = straight_flight(kin)
-        bump = rng.standard_normal((kin.slots, 2)) * rng.uniform(0, 2)
-        candidate = kin.integrate(flight.v[0], flight.a + 0.02 * (bump + other.a - flight.a))
-        if max(kin.residuals(candidate).values()) < 1e-9:
-            gains.append(best - xi(sums, candidate.w))
-    assert len(gains) > 20
-    assert max(gains) < 1e-3 * sum(s.value(flight.w) for s in sums)
 
 
 def test_rounding_errors_do_not_change_a_digit(paper_plan: MakePlan) -> None:

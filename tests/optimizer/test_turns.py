@@ -1,7 +1,6 @@
 """Turns within what a plane's guidance follows at its speed, whatever its least speed is."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from test_interior import plane, worst
 from faao_mav.arrays import Real
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.search.cruise import turning_curves
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Vector
 from faao_mav.report.summary import result_lines
@@ -66,28 +64,6 @@ def test_turns_allowed_in_the_air_are_allowed_over_ground(
     assert (TURN * both / 2 <= allowed * (1 + 1e-9)).all()
 
 
-@pytest.mark.parametrize("wind", [0.0, 4.0])
-def test_a_lower_least_speed_never_shrinks_what_is_allowed(
-    small_plan: MakePlan, wind: float
-) -> None:
-    delivered: list[float] = []
-    at_wind = {"site.wind": {"speed": wind, "from": 200.0}} if wind else {}
-    powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
-    plans = [
-        small_plan({**PLANE, **at_wind, **powers, "vehicle.min_speed": least})
-        for least in (9, 6, 1)
-    ]
-    for plan in plans:
-        solution = optimize(plan)
-        assert solution.residuals()["turn"] < 1e-9
-        for lower in (kinematics(each) for each in plans):
-            if lower.min_speed <= plan.vehicle.min_speed:
-                assert worst(lower, solution.trajectory) < 1e-6
-        delivered.append(solution.rates.R_avg)
-    assert (np.diff(delivered) > -1e-3).all()
-    assert delivered[-1] > delivered[0] + 1e-3
-
-
 def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: MakePlan) -> None:
     plan = small_plan(PLANE | {"vehicle.min_speed": 9})
     solution, kin = optimize(plan), kinematics(plan)
@@ -126,15 +102,3 @@ def test_the_published_aircraft_flies_with_any_least_speed(
     solution = optimize(small_plan(PLANE | changes))
     assert solution.converged
     assert worst(kinematics(solution.plan), solution.trajectory) < 1e-6
-
-
-@pytest.mark.parametrize("c", [1.3, 8.0, 25.0])
-@pytest.mark.parametrize("seconds", [3.0, 30.0])
-def test_curves_too_short_for_their_changes_of_speed_go_forward(seconds: float, c: float) -> None:
-    ahead = np.array([12.0, 0.0])
-    kin = replace(cruiser(seconds, 1.0), start_velocity=ahead, end_velocity=ahead)
-    for v in turning_curves(kin, c):
-        size = np.linalg.norm(v, axis=1)
-        assert size.min() > 0
-        assert (size <= max(c, 12) + 1e-9).all()
-        assert (size >= min(c, 12) - 1e-9).all()

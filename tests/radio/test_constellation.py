@@ -41,13 +41,6 @@ def test_unit_energy_and_zero_mean(modulation: str) -> None:
     assert len(np.unique(np.round(symbols, 9))) == len(symbols)
 
 
-@pytest.mark.parametrize("modulation", MODULATIONS)
-@pytest.mark.parametrize("antennas", [1, 2])
-def test_symbol_vectors_have_unit_covariance(modulation: str, antennas: int) -> None:
-    x = symbol_vectors(modulation, antennas)
-    np.testing.assert_allclose(x.T @ x.conj() / len(x), np.eye(antennas), atol=1e-13)
-
-
 @pytest.mark.parametrize(
     ("modulation", "antennas"),
     [*((m, n) for m in MODULATIONS for n in (1, 2)), ("8psk", 3), ("16qam", 3), ("bpsk", 6)],
@@ -71,22 +64,6 @@ def test_merged_sum_equals_the_sum_over_pairs(modulation: str, antennas: int, sc
     classes = difference_classes(modulation, antennas)
     D = np.sum(np.abs(classes.vectors @ A.T) ** 2, axis=1) / 4
     assert classes.symbols + classes.multiplicity @ np.exp(-D) == pytest.approx(total, rel=1e-12)
-
-
-@pytest.mark.parametrize("modulation", MODULATIONS)
-def test_no_two_classes_differ_by_a_phase_only(modulation: str) -> None:
-    u = difference_classes(modulation, 2).vectors
-    # Turn each so that its first entry that is not zero is real and positive.
-    lead = np.where(np.abs(u[:, 0]) > 1e-9, u[:, 0], u[:, 1])
-    turned = np.round(u * (np.abs(lead) / lead)[:, None], 8) + 0.0
-    assert len(np.unique(turned, axis=0)) == len(u)
-
-
-def test_arrays_are_read_only_and_cached() -> None:
-    classes = difference_classes("qpsk", 2)
-    assert classes is difference_classes("qpsk", 2)
-    for array in (classes.vectors, classes.multiplicity, constellation("qpsk")):
-        assert not array.flags.writeable
 
 
 def test_what_is_refused() -> None:

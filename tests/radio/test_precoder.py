@@ -71,17 +71,6 @@ def test_zero_forcing_makes_the_link_diagonal() -> None:
     parallel(link.conj().T @ link, np.eye(2))
 
 
-def test_maximum_ratio_is_matched_to_the_channel() -> None:
-    H = channel(4, 3, 3)
-    parallel(mrt(H, 2.0, 1.0), H.conj().T)
-    H = channel(4, 2, 3)
-    parallel(mrt(H, 2.0, 1.0), np.hstack([H.conj().T, np.zeros((3, 1))]))
-    H = channel(4, 4, 2)
-    P = mrt(H, 2.0, 1.0)
-    parallel(P @ P, H.conj().T @ H)
-    parallel(P, P.conj().T)
-
-
 @pytest.mark.parametrize(("receive", "transmit"), SHAPES)
 def test_mmse_lies_between_maximum_ratio_and_zero_forcing(receive: int, transmit: int) -> None:
     H = channel(5, receive, transmit)

@@ -99,13 +99,6 @@ def test_more_room_never_delivers_less_and_half_duplex_never_more(route: tuple[R
     assert all(shared <= own + 1e-9 for shared, own in zip(half, full, strict=True))
 
 
-@given(routes())
-def test_time_reversed_with_the_hops_swapped_delivers_as_much(route: tuple[Real, Real]) -> None:
-    I_U, I_G = route
-    back = forward_greedily(I_G[::-1].copy(), I_U[::-1].copy())
-    assert back.rate == pytest.approx(forward_greedily(I_U, I_G).rate)
-
-
 @pytest.mark.parametrize(
     ("I_U", "I_G", "buffer"),
     [
