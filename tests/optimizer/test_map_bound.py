@@ -42,6 +42,10 @@ KINDS: dict[str, dict[str, Any]] = {
         "flight.bound_first_acceleration": False,
     },
     "fence": WALL | {"radio.causal": True},
+    "moving": {
+        "radio.causal": True, "radio.duplex": "half",
+        "radio.base_station.velocity": [4, -3], "radio.ground_user.velocity": [-6, 2],
+    },
 }  # fmt: skip
 
 

@@ -95,16 +95,15 @@ class MapBound:
     def _rates(self) -> dict[int, Real]:
         """Rates of both links (2, parts, velocities, i, j) in runs of slots, bits.
 
-        By the number of the run with known draws, else by its length. With known draws the
-        velocities are one, which stands for all. The slots of a run are added up, to one part,
-        unless they are shared (half duplex).
+        By the number of the run where each has rates of its own, else by its length. In the first
+        case the velocities are one, which stands for all. The slots of a run are added up, to one
+        part, unless they are shared (half duplex).
         """
-        known = self.rates.known
         runs = enumerate(self.cells.blocks)
-        found = {(k if known else len(run)): k for k, run in runs}
-        return {key: self._of_run(k, known=known) for key, k in found.items()}
+        found = {(k if self._each else len(run)): k for k, run in runs}
+        return {key: self._of_run(k) for key, k in found.items()}
 
-    def _of_run(self, k: int, *, known: bool) -> Real:
+    def _of_run(self, k: int) -> Real:
         kin, cells = self.problem.kinematics, self.cells
         most, slots = kin.max_speed, cells.blocks[k]
         along = np.arange(-_DIRECTIONS, _DIRECTIONS + 1) * most / _DIRECTIONS
@@ -112,7 +111,7 @@ class MapBound:
         gap = most / _DIRECTIONS * CORNER
         velocities = velocities[np.hypot(*velocities.T) <= most + gap]
         velocities = velocities[len(velocities) // 2 :]  # a run backwards has the same rates
-        if known or len(slots) == 1:
+        if self._each or len(slots) == 1:
             velocities, gap = np.zeros((1, 2)), most
         parts = len(slots) if self._half else 1
         found = np.zeros((2, parts, len(velocities), *cells.x.shape[1:]))
@@ -127,6 +126,12 @@ class MapBound:
         return found
 
     @property
+    def _each(self) -> bool:
+        """Whether each run of slots has rates of its own: of known draws, of stations that move."""
+        moving = any(link.gains.station.ndim > 1 for link in self.problem.links)
+        return self.rates.known or moving
+
+    @property
     def _half(self) -> bool:
         queue = self.problem.maximised_queue
         return queue is not None and queue.half
@@ -136,7 +141,6 @@ class MapBound:
 
         Through each cell at an instant a flight is worth no more than at any of the prices.
         """
-        known = self.rates.known
         p = np.clip(np.array(prices), 0.0, 1.0)[:, None, None, None, None]
         worth = {}
         for key, (received, forwarded) in self._rates.items():
@@ -144,7 +148,7 @@ class MapBound:
             total = np.maximum(*both) if self._half else both[0] + both[1]
             worth[key] = total.sum(axis=1).max(axis=1)
         runs = self.cells.blocks
-        rewards = np.stack([worth[k if known else len(run)] for k, run in enumerate(runs)])
+        rewards = np.stack([worth[k if self._each else len(run)] for k, run in enumerate(runs)])
         rewards = np.where(self.cells.alive[:, None], rewards, -np.inf)
         ends = np.array([at_ends(self.problem, self.rates, price) for price in p.ravel().tolist()])
         through = self.cells.through(rewards) + ends[:, None, None]
