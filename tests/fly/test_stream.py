@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scenes import HOLD, LAND, Scene, is_setpoint, low, swift, under
 from stations import a_mission, peer_of, vehicle_of
 
+from faao_mav import optimize
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.fly.own import OwnClock
@@ -64,6 +65,21 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     assert steps.min() >= 80
     assert loss or steps.max() <= 120
     assert {each.type_mask for each in setpoints(scene)} == {3072}
+
+
+@KINDS
+def test_a_convoy_is_served_as_planned(kind: str) -> None:
+    velocities = dict.fromkeys(
+        ("radio.base_station.velocity", "radio.ground_user.velocity"), (5, 0)
+    )
+    changes = {"flight.duration": 24, "flight.end": [110, 20], "radio.causal": True}
+    solution = optimize(low().plan.changed(velocities | changes))
+    scene = Scene(kind, solution=solution)
+    assert scene.run(Faults()) == "finished"
+    found = flown(scene, solution)
+    assert found.delivered_rate == pytest.approx(solution.delivered_rate, rel=0.01)
+    late = flown(scene, replace(solution, problem=solution.problem.begun(10.0)))
+    assert late.delivered_rate < 0.9 * solution.delivered_rate
 
 
 def test_only_copters_are_flown_by_setpoints() -> None:
