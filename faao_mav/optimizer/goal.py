@@ -4,9 +4,9 @@ The searches rest on what is delivered growing with each. A flight at the speeds
 takes c times as long along the same path: with c > 1 it keeps the limits, with ends that hover or
 are free, and its rates have the same means, so that R_del never falls as T grows and T R_del rises
 with it. A precoder that keeps a power limit keeps a larger one, and so does a flight with a limit
-on its energy. Where the growth is not certain (known draws, which change with T; wind; a least
-speed; a buffer that fills), the answer still meets the goal and one step less was found not to, but
-a smaller one may meet it.
+on its energy. Where the growth is not certain (known draws, which change with T; stations that
+move; wind; a least speed; a buffer that fills), the answer still meets the goal and one step less
+was found not to, but a smaller one may meet it.
 
 The data that an energy E lets be delivered rise along T while there is energy to spare, and fall
 where it is short, to nothing at E = T min P: a search over T finds their maximum. Energies are
