@@ -3,17 +3,22 @@
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
-from conftest import SMALL, edited
+from conftest import MISSIONS, SMALL, edited
 from hypothesis import given
 from hypothesis import strategies as st
 
-from faao_mav import optimize
+from faao_mav import optimize, plan_mission
 from faao_mav.errors import PlanError
+from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import Plan, parse_plan, read_plan
 from faao_mav.plan.station import MAX_POINTS
+from faao_mav.report import summary
+from faao_mav.validate import Level
+from faao_mav.validate.demands import LATE_START
 
 BASE, USER = "radio.base_station", "radio.ground_user"
 HEAD = "time_s,east_m,north_m\n"
@@ -195,3 +200,28 @@ def test_with_both_stations_at_u_a_plane_flies_as_to_stations_that_stand_in_a_wi
     np.testing.assert_allclose(calm.w - calm.t[:, None] * u, windy.w, atol=1e-3)
     assert calm.delivered_rate == pytest.approx(windy.delivered_rate, abs=1e-6)
     assert max(calm.residuals().values()) < 1e-6
+
+
+def test_the_convoy_is_drawn_told_and_flown_as_planned(tmp_path: Path) -> None:
+    result = plan_mission(read_plan(MISSIONS / "convoy.yaml"))
+    solution, link = result.solution, result.check.link if result.check else None
+    assert link is not None
+    assert link.share > 0.99
+    assert link.late_share is not None
+    assert link.late_share < 0.9
+    first, late = (solution.problem.begun(t).bs_uav.gains.station for t in (0.0, LATE_START))
+    np.testing.assert_allclose(late - first, [[40, 0]] * len(solution.t), atol=1e-9)
+    text = summary(result)
+    assert "moving       base 398 m from [0, 0] to [398, 0]; user 498 m from [150, 220]" in text
+    assert f"it begins {link.begins:.0f} s after the mission" in text
+    assert {finding.level for finding in result.findings} == {Level.NOTE}
+    assert "link-moving" in {finding.rule for finding in result.findings}
+
+    result.write(tmp_path / "convoy.kml")
+    drawn = Xml.parse(tmp_path / "convoy.kml").getroot()
+    tracks = drawn.findall(".//{*}Track")
+    assert len(tracks) == 3  # the flight and both stations
+    frame = LocalFrame(solution.plan.origin.latitude, solution.plan.origin.longitude)
+    coords = [(each.text or "").split() for each in tracks[2].findall("{*}coord")]
+    user = np.array(coords, dtype=float)[[0, -1], 1::-1]
+    np.testing.assert_allclose(frame.to_local(*user.T), [[150, 220], [576, 447]], atol=0.01)
