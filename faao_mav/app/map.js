@@ -199,14 +199,15 @@ export default {
       }
       if (track.length) line(track, "track");
       this.ways = moving.flatMap(([, way]) => way);
+      this.lines.push(...moving.map(([, way]) => way));
       for (const [kind, way] of moving) {
         line(way, "moving");
         const [from, to] = way.slice(-2).map((at) => this.map.latLngToContainerPoint(at));
         const turned = `rotate(${Math.atan2(to.y - from.y, to.x - from.x)}rad)`;
-        const name = { base: "Base station", user: "User" }[kind];
-        const html = `<i style="transform: ${turned}">➤</i><span>${name} at the end</span>`;
+        const title = `${{ base: "Base station", user: "User" }[kind]} at the end`;
+        const html = `<i style="transform: ${turned}">➤</i><span>${title}</span>`;
         L.circleMarker(way[0], { radius: 4, className: "moving", interactive: false }).addTo(this.route);
-        L.marker(way.at(-1), { icon: L.divIcon({ className: `mark mark-${kind} mark-later`, html, iconSize: [18, 18] }), interactive: false, keyboard: false }).addTo(this.route);
+        L.marker(way.at(-1), { icon: L.divIcon({ className: `mark mark-${kind} mark-later`, html, iconSize: [18, 18] }), title, interactive: false, keyboard: false }).addTo(this.route);
       }
       this.show_waypoints();
       this.show_key();
@@ -222,7 +223,8 @@ export default {
       });
       const edges = this.shapes?.flatMap(({ corners }) => (corners ? [[...corners, corners[0]]] : [])) ?? [];
       const lines = [...this.lines, ...edges].flatMap(along);
-      const taken = this.marks.getLayers().map((mark) => {
+      const marks = [...this.marks.getLayers(), ...this.route.getLayers()].filter((each) => each.options.title);
+      const taken = marks.map((mark) => {
         const here = on_screen(mark.getLatLng());
         return L.bounds(here.subtract([12, 12]), here.add([24 + 8 * mark.options.title.length, 12]));
       });
