@@ -12,6 +12,13 @@ class FaaoError(Exception):
 
     The message shows characters that a terminal may act on as their codes, but for the ends of
     its lines.
+
+    >>> from faao_mav import read_mission
+    >>> try:
+    ...     read_mission("nowhere.plan")
+    ... except FaaoError as error:
+    ...     print(type(error).__name__, "-", error)
+    MissionFileError - nowhere.plan: cannot be read: No such file or directory
     """
 
     def __str__(self) -> str:
@@ -19,7 +26,14 @@ class FaaoError(Exception):
 
 
 class InputError(FaaoError):
-    """What was given cannot be used: a plan, an argument, a file."""
+    """What was given cannot be used: a plan, an argument, a file.
+
+    >>> from faao_mav import Limits
+    >>> Limits(max_speed=-1.0)
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.InputError: max_speed: -1.0; expected a number above 0
+    """
 
 
 class PlanError(InputError):
@@ -43,7 +57,16 @@ class ParameterFileError(InputError):
 
 
 class InfeasibleError(FaaoError):
-    """The input is sound, but nothing satisfies it: no trajectory, no mission within the limits."""
+    """The input is sound, but nothing satisfies it: no trajectory, no mission within the limits.
+
+    >>> from faao_mav import convert, optimize, read_plan
+    >>> few = {"radio.fading": "none", "mission.max_items": 5}
+    >>> solution = optimize(read_plan("missions/copter_relay.yaml").changed(few))
+    >>> convert(solution)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.InfeasibleError: ... mission.max_items ...
+    """
 
 
 class SolverError(FaaoError):

@@ -66,6 +66,11 @@ class Result:
     whether the alphabet limits the rate, `bound` estimates what no route can exceed, if asked for;
     `shadowed` tells what arrives under shadowing, where its spread is known.
     `seconds_optimize` is the time of the optimiser, `seconds_total` that of everything, in seconds.
+
+    >>> from faao_mav import plan_mission, read_plan
+    >>> result = plan_mission(read_plan("missions/copter_relay.yaml"))
+    >>> result.flyable, result.as_dict()["delivered_rate"] == result.solution.delivered_rate
+    (True, True)
     """
 
     solution: Solution

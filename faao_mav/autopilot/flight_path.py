@@ -76,6 +76,11 @@ class Track:
     east, north, up in metres about `frame`'s origin (up: above home) and m/s; `item` (n,) is the
     index into `Mission.items` of the item under way. `reached` (items,), s, is when each item was
     done, NaN for items that take no time of their own or never end.
+
+    >>> from faao_mav import Vehicle, predict, read_mission
+    >>> track = predict(read_mission("tests/data/missions/plain.waypoints"), Vehicle())
+    >>> track.position.shape == track.velocity.shape == (len(track.t), 3)
+    True
     """
 
     t: Real

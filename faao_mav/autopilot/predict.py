@@ -61,6 +61,11 @@ def predict(
     Raises `InputError` for places that cannot be flown to (NaN, altitudes above sea level
     without a home), parameters that are useless, or a flight that takes more than
     1.5 hours, of a plane six.
+
+    >>> from faao_mav import read_mission
+    >>> track = predict(read_mission("tests/data/missions/plain.waypoints"), Vehicle())
+    >>> bool(120 < track.t[-1] < 140)
+    True
     """
     home, start = mission.home, mission.first_place or (0.0, 0.0)
     if home is not None:

@@ -56,6 +56,13 @@ def fly_mission(
     and what that raises. `rate` is how many positions it is asked for a second. `watching` is
     called after every step. Raises `LinkError` if there is no such vehicle, none that is known
     here, or its mission cannot be read.
+
+    >>> from faao_mav import Flight, read_mission
+    >>> flight = Flight(read_mission("tests/data/missions/plain.waypoints"))
+    >>> fly_mission(flight, "udpout:127.0.0.1:9", wait=0.1)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.LinkError: udpout:127.0.0.1:9: no heartbeat of an autopilot ...
     """
     with Session(connection, **options) as session:
         vehicle, peer = session.found, session.peer

@@ -70,6 +70,10 @@ def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
     There are several where several vehicles tell their positions in a `.tlog`, unless `system`
     names one. A log that ends in the middle is read as far as it goes. It is read in a process of
     its own, which runs no code of the current directory. Raises `InputError` for anything else.
+
+    >>> (flight,) = read_log(Path("tests/data/logs/arducopter.tlog"))
+    >>> flight.system, bool(flight.t[-1] - flight.t[0] > 60)
+    (1, True)
     """
     ending = path.suffix.lower()
     if not path.is_file():

@@ -92,6 +92,11 @@ class Flight:
     `vehicle` has the parameters that the mission is timed for, whose `source` says where they come
     from; `made_for` says what is known of whom it was made for. A `solution` tells what the flight
     is to deliver, and may tell what it takes of the battery.
+
+    >>> from faao_mav import Vehicle, read_mission
+    >>> flight = Flight(read_mission("tests/data/missions/plain.waypoints"), Vehicle())
+    >>> flight.streamed, flight.solution
+    (False, None)
     """
 
     mission: Mission

@@ -47,6 +47,9 @@ class MissionItem:
     have it in any place, and what an autopilot makes of it depends on the place.
 
     Raises `InputError` for integers out of range, other than four parameters, infinities.
+
+    >>> MissionItem(command=16, frame=3, x=-35.3633, y=149.1652, z=30.0).params
+    (0.0, 0.0, 0.0, 0.0)
     """
 
     command: int

@@ -184,6 +184,11 @@ class Problem:
 
     `energy` is what flight and relay may take, J. A `precoder` of one's own takes the place of the
     plan's.
+
+    >>> from faao_mav import read_plan
+    >>> problem = build_problem(read_plan("missions/copter_relay.yaml"))
+    >>> problem.bs_uav.most, problem.plan.flight.slots
+    (4.0, 240)
     """
 
     plan: Plan
@@ -302,6 +307,15 @@ class OwnParts(TypedDict, total=False):
 
     `gain` is the law of both hops, `rate` that of one stream over its SNR, `precoder` a function
     as `OwnPrecoder` says. A saved result does not have them.
+
+    >>> from faao_mav import StreamRate, optimize, read_plan
+    >>> class Capacity(StreamRate):
+    ...     most = 20.0
+    ...     def value(self, snr):
+    ...         return np.log2(1 + snr)
+    >>> solution = optimize(read_plan("missions/copter_relay.yaml"), rate=Capacity())
+    >>> solution.converged
+    True
     """
 
     gain: GainFunction
@@ -313,6 +327,10 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
     """Turn `plan` into arrays; the fading is drawn from its seed. `parts` are one's own.
 
     Raises `PlanError` when the plan is larger than ``size.check_size`` accepts.
+
+    >>> from faao_mav import read_plan
+    >>> build_problem(read_plan("missions/copter_relay.yaml"))
+    <Problem of <Plan 'copter relay near Canberra': 120 s in slots of 0.5 s, ardupilot copter>>
     """
     check_size(plan)
     radio, slots = plan.radio, plan.flight.slots

@@ -348,7 +348,13 @@ _TOLD = ("plan", "ending", "converged", "starts")
 
 
 def load_solution(path: str | Path) -> Solution:
-    """Read what `save_solution` wrote. Raises `InputError` for anything else."""
+    """Read what `save_solution` wrote. Raises `InputError` for anything else.
+
+    >>> load_solution("README.md")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.InputError: README.md: ...
+    """
     found = read_archive(path, (*_TOLD, *_ARRAYS, "shares", "gain"))
     for name in (*_TOLD, *_ARRAYS):
         if name not in found:

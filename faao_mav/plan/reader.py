@@ -115,7 +115,12 @@ def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
 
 
 def parse_plan(text: str, source: str = "plan", *, method: str | None = None) -> Plan:
-    """Validate the plan in `text`; `source` names it in messages. See `read_plan`."""
+    """Validate the plan in `text`; `source` names it in messages. See `read_plan`.
+
+    >>> from pathlib import Path
+    >>> parse_plan(Path("missions/copter_relay.yaml").read_text()).flight.duration
+    120.0
+    """
     data = load_yaml(text, source)
     if method is not None:
         section = data.setdefault("optimizer", {})

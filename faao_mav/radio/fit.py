@@ -61,6 +61,12 @@ class Samples:
 
     Places are east, north and up of the station's antenna. The level is the gain, dB, or the gain
     within a constant, such as a received power, dBm. `source` names the log.
+
+    >>> t = np.arange(0.0, 60.0)
+    >>> place = np.stack([10.0 * t, 0.0 * t, 50.0 + 0.0 * t], axis=1)
+    >>> flight = Samples(t, place, -40.0 - 20.0 * np.log10(np.linalg.norm(place, axis=1)))
+    >>> len(flight.means(2.0).t)
+    30
     """
 
     t: Real
@@ -100,6 +106,10 @@ class LinkFit:
     is `paper_spread`, that of d^-2; `correlation` is the distance, m, over which the correlation of
     residuals falls to 1/e. `flights` are the means it rests on; `legs` and `heights` are how many
     were left out one by one.
+
+    >>> fit = LinkFit(-48.5, 2.0, (54.48, -75.2), (), 0, 6.2, 7.5, 80.0, 4, 1, ())
+    >>> fit.exponent, fit.spread < fit.paper_spread
+    (2.0, True)
     """
 
     level: float

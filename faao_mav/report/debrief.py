@@ -55,6 +55,12 @@ def debrief(log: str | Path, solution: Solution, system: int | None = None) -> "
 
     Of several vehicles in a `.tlog` it is the one whose flight is the plan's, or that of `system`.
     Raises `FaaoError` where the plan's flight is not in it, `InputError` for no log.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> solution = optimize(read_plan("tests/data/logs/plan.yaml"))
+    >>> told = debrief("tests/data/logs/arducopter.tlog", solution).as_dict()
+    >>> told["flown"]["delivered_rate"] > 0.9 * told["planned"]["delivered_rate"]
+    True
     """
     return FromLog.of(read_log(Path(log), system), with_mission(Result(solution)), str(log))
 

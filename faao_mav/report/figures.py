@@ -41,7 +41,13 @@ class _Plot(NamedTuple):
 def flight_figure(
     solution: Solution, conversion: Conversion | None = None, prediction: Prediction | None = None
 ) -> "Figure":
-    """Return the flight in one figure, as `--figure` saves it: map, speed, and both rates."""
+    """Return the flight in one figure, as `--figure` saves it: map, speed, and both rates.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> figure = flight_figure(optimize(read_plan("missions/copter_relay.yaml")))
+    >>> figure.axes[1].get_ylabel()
+    'speed, m/s'
+    """
     with drawing(9.6, 5.6) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=[1.15, 1.0])
         plot = figure.add_subplot(grid[:, 0])

@@ -31,6 +31,11 @@ def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
 
     A part that a `Result` does not have leaves its sections out. The title is the plan's name
     unless one is given. The same flight gives the same text.
+
+    >>> from faao_mav import Vehicle, check, read_mission
+    >>> mission = read_mission("tests/data/missions/plain.waypoints")
+    >>> render_report(check(mission, Vehicle()), title="Plain").splitlines()[0]
+    '<!doctype html>'
     """
     if not title and isinstance(about, Result):
         title = about.solution.plan.name

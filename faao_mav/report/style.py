@@ -221,7 +221,14 @@ def render(figure: "Figure", suffix: str) -> bytes:
 
 
 def save_figure(figure: "Figure", path: str | Path) -> None:
-    """Write `figure` to `path`, whole or not at all, in the format of its ending."""
+    """Write `figure` to `path`, whole or not at all, in the format of its ending.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> save_figure(optimize(read_plan("missions/copter_relay.yaml")).plot(), "flight.gif")
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.InputError: figure flight.gif: give a name that ends in .png, .svg, .pdf
+    """
     path = Path(path)
     check_ending(path, "figure", FIGURES)
     write_whole(path, render(figure, path.suffix))

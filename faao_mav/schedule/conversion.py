@@ -113,6 +113,11 @@ def convert(solution: Solution) -> Conversion:
     A route whose legs or predicted flight leave the plan's fence is made anew with half the path
     tolerance, again and again down to 0.25 m; if none keeps inside, it is the one that leaves the
     fence the least. The rest is as in `_convert`.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> conversion = convert(optimize(read_plan("missions/copter_relay.yaml")))
+    >>> sorted(conversion.parameters)[:2]
+    ['WPNAV_ACCEL', 'WPNAV_JERK']
     """
     plan, area = solution.plan, solution.plan.keep_in
     best = _convert(solution, plan)

@@ -60,6 +60,12 @@ def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     """Return the figure `kind` of `rows`: `delivered`, `rate` (R_avg) or `trajectories`.
 
     Raises `InputError` where `can_draw` says no.
+
+    >>> from faao_mav import make_cases, read_plan, run_study
+    >>> plan = read_plan("missions/copter_relay.yaml").changed({"radio.fading": "none"})
+    >>> rows = run_study(make_cases(plan.text, vary={"flight.altitude": [60, 120]}), jobs=1)
+    >>> study_figure(rows, plan, "delivered").axes[0].get_xlabel()
+    'height H, m'
     """
     if not can_draw(rows, kind):
         raise InputError("nothing to draw: no result, or no key varied over two numbers or more")

@@ -48,6 +48,10 @@ class StudyRow:
     `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth. `seconds` is the
     time of the optimiser. Where there is no result `error` says why and the numbers are None.
     `route` is w (n, 2), m, one pair for each slot.
+
+    >>> row = StudyRow("", {"flight.altitude": 60}, "faao", 0, R_avg=1.5, delivered=1.4)
+    >>> row.values["flight.altitude"], row.delivered, len(row.route)
+    (60, 1.4, 0)
     """
 
     __pydantic_config__: ClassVar = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -86,6 +90,11 @@ def as_array(rows: Sequence[StudyRow]) -> NDArray[np.void]:
 
     Numbers that a row does not have are NaN, texts empty. `pandas.DataFrame(as_array(rows))` is the
     same as a table of pandas.
+
+    >>> rows = [StudyRow("", {"power_dbm": dbm}, "faao", 0, R_avg=dbm / 10) for dbm in (5, 10)]
+    >>> table = as_array(rows)
+    >>> table["power_dbm"].tolist(), table["R_avg"].tolist()
+    ([5, 10], [0.5, 1.0])
     """
     records = [as_dict(row) for row in rows]
     columns = {}

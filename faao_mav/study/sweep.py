@@ -146,6 +146,12 @@ def make_cases(
 
     `text` is a sound plan, `source` names it. Seeds count up from its `radio.seed`. Raises
     `InputError` for a grid of more than `MAX_ROWS`.
+
+    >>> from faao_mav import read_plan
+    >>> plan = read_plan("missions/copter_relay.yaml")
+    >>> cases = make_cases(plan.text, vary={"flight.duration": [90, 120]}, schemes=("faao", "mrt"))
+    >>> [(case.values, case.scheme) for case in cases][1]
+    ((('flight.duration', 90),), 'mrt')
     """
     data = load_yaml(text, source)
     data.pop("study", None)

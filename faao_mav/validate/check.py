@@ -24,6 +24,10 @@ class Check:
     a plan or a track. `findings` are the worst first. `wind`,
     m/s, is what `track` is predicted in, `energy` what the flight takes, None where no plan tells
     its power.
+
+    >>> from faao_mav import Vehicle, check, read_mission
+    >>> check(read_mission("tests/data/missions/plain.waypoints"), Vehicle())
+    <Check of <Mission: 5 items, 0 zones, 0 rally points>: 0 errors, 0 warnings, 0 notes>
     """
 
     mission: Mission

@@ -21,6 +21,12 @@ class Limits:
     `max_duration`, s, of the whole flight; `max_distance`, m, from home over ground;
     `max_altitude`, m above home; `max_speed`, m/s, over ground; `max_acceleration`, m/s², over
     ground. Raises `InputError` for one that is not a finite number above 0.
+
+    >>> from faao_mav import Vehicle, check, read_mission
+    >>> low = Limits(max_altitude=20.0)
+    >>> found = check(read_mission("tests/data/missions/plain.waypoints"), Vehicle(), limits=low)
+    >>> {finding.rule for finding in found.findings} == {"above-ceiling", "predicted-beyond"}
+    True
     """
 
     max_duration: float | None = None
@@ -63,6 +69,11 @@ class LinkCheck:
     where the planned route leaves what the gain of a hop was measured at. The plan begins `begins`
     s after the mission; `late_share` is the part of the planned rate that one which begins
     `LATE_START` later delivers, None where no station moves.
+
+    >>> from faao_mav import plan_mission, read_plan
+    >>> link = plan_mission(read_plan("missions/copter_relay.yaml")).check.link
+    >>> 0.99 < link.predicted_rate / link.planned_rate < 1.01, link.late < 1.0
+    (True, True)
     """
 
     planned_rate: float

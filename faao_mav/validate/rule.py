@@ -33,6 +33,12 @@ class Finding:
     the item's number in QGroundControl and Mission Planner; None if it is about no single item.
     `message` says what is the case, with the value and the limit; `action` what to do about it, ""
     for nothing.
+
+    >>> from faao_mav import Vehicle, check, read_mission
+    >>> mission = read_mission("tests/data/validate/crosses-no-fly-circle.plan")
+    >>> first, *_ = check(mission, Vehicle()).findings
+    >>> first.level.name, first.rule, first.item
+    ('ERROR', 'fence-leg', 3)
     """
 
     level: Level

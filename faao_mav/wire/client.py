@@ -111,6 +111,13 @@ def upload(
     Raises `LinkError` if there is no such vehicle, it is another one than the mission was
     `made_for`, it is armed (replacing the mission in flight needs `allow_armed`), or the link
     breaks; `InputError` for what cannot be sent.
+
+    >>> from faao_mav import read_mission
+    >>> mission = read_mission("tests/data/missions/plain.waypoints")
+    >>> upload(mission, "udpout:127.0.0.1:9", wait=0.1)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.LinkError: udpout:127.0.0.1:9: no heartbeat of an autopilot ...
     """
     if not mission.items:
         raise InputError("upload: the mission has no items")
@@ -167,6 +174,11 @@ def download(connection: str, **options: Unpack[LinkOptions]) -> Mission:
     """Return the mission, fence and rally points of the vehicle at `connection`.
 
     See `holdings`; raises `LinkError` where one of them does not come whole, too.
+
+    >>> download("udpout:127.0.0.1:9", wait=0.1)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.LinkError: udpout:127.0.0.1:9: no heartbeat of an autopilot ...
     """
     found = holdings(connection, **options)
     if found.problems:

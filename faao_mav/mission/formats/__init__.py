@@ -66,6 +66,10 @@ def read_mission(path: str | Path) -> Mission:
 
     The file's format is told by the ending of its name. Raises `MissionFileError` as
     `read_mission_file`.
+
+    >>> mission = read_mission("tests/data/missions/plain.waypoints")
+    >>> [item.command for item in mission.items]
+    [22, 178, 16, 177, 20]
     """
     return read_mission_file(path).mission
 

@@ -46,6 +46,11 @@ def read_parameters(path: str | Path) -> dict[str, float]:
     byte order mark, blank lines, comments at the end of a line, hexadecimal values, `@READONLY`.
     Raises `ParameterFileError` for anything else, naming file, line and value; for a name that
     has two values; for no parameters.
+
+    >>> read_parameters("README.md")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.ParameterFileError: README.md: line 3: ...
     """
     text = read_text(path, MAX_BYTES, "a file of parameters", ParameterFileError)
     result: dict[str, float] = {}
