@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from faao_mav.cli.shared import AsJson, File, exit_status, note, option, progress, show
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, PlanError
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
-    from faao_mav.study import StudyCase, StudyRow
+    from faao_mav.study import StudyRow
 
 _INTERRUPTED = 130
 """The exit status of an interrupted study, as a shell reports SIGINT: 128 + 2."""
@@ -55,7 +55,7 @@ def study(
 
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
-    from faao_mav.plan import read_plan
+    from faao_mav.plan import parse_plan, read_plan
     from faao_mav.plan.keys import POWER
     from faao_mav.plan.sections import Study
     from faao_mav.study import make_cases, parse_vary, run_study
@@ -87,7 +87,16 @@ def study(
             seeds=seeds or asked.seeds,
             source=str(plan_file),
         )
-    _check_cases(cases)
+    refused = []
+    for case in cases:  # values that no case can use are refused; some may fail and become rows
+        try:
+            parse_plan(case.text, case.source)
+        except PlanError as error:
+            refused.append(error)
+        else:
+            break
+    else:
+        raise refused[0]
     try:
         with progress(shown=sys.stderr.isatty()) as draw:
             done = itertools.count(1)
@@ -130,19 +139,3 @@ def _draw(rows: "Sequence[StudyRow]", plan: "Plan", along: str | None, out: Path
             save_figure(figure, path)
             written.append(path)
     return written
-
-
-def _check_cases(cases: "Sequence[StudyCase]") -> None:
-    """Refuse values that no case can use, before any work; some may fail and become rows."""
-    from faao_mav.errors import PlanError
-    from faao_mav.plan import parse_plan
-
-    first = None
-    for case in cases:
-        try:
-            parse_plan(case.text, case.source)
-            return
-        except PlanError as error:
-            first = first or error
-    if first is not None:
-        raise first

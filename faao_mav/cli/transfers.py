@@ -1,6 +1,7 @@
 """`faao-mission upload` and `download`: a mission to a vehicle, verified, and what one holds."""
 
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -91,6 +92,14 @@ def send(mission: "Mission", to: str, *, shown: bool, **options: Any) -> "Upload
 def as_dict(report: "UploadReport") -> dict[str, Any]:
     """Return `report` as JSON takes it."""
     vehicle, stands = report.vehicle, report.stands
+    lists = [
+        {
+            "list": part.part.name.lower(),
+            **_fields(part, "part", "said"),
+            "differences": [_fields(each, "part") for each in part.differences],
+        }
+        for part in report.parts
+    ]
     return {
         "verified": report.verified,
         "vehicle": {
@@ -99,29 +108,17 @@ def as_dict(report: "UploadReport") -> dict[str, Any]:
             "autopilot": vehicle.autopilot,
             "type": vehicle.kind,
         },
-        "stands": None
-        if stands is None
-        else _fields(stands, "from_home", "higher", "from_first", "is_meant"),
-        "parameters": [_fields(each, "name", "old", "new", "wanted") for each in report.changes],
+        "stands": stands and _fields(stands) | {"is_meant": stands.is_meant},
+        "parameters": [_fields(each) for each in report.changes],
         "seconds": round(report.seconds, 3),
         "problems": list(report.problems),
-        "lists": [
-            {
-                "list": part.part.name.lower(),
-                **_fields(part, "items", "verdict", "result", "attempts", "opaque_id"),
-                "differences": [
-                    _fields(each, "item", "field", "sent", "found", "kind")
-                    for each in part.differences
-                ],
-            }
-            for part in report.parts
-        ],
+        "lists": lists,
     }
 
 
-def _fields(record: object, *names: str) -> dict[str, Any]:
-    """Return fields of `record` by name, as JSON takes them."""
-    return {name: _plain(getattr(record, name)) for name in names}
+def _fields(record: Any, *but: str) -> dict[str, Any]:
+    """Return the fields of `record` as JSON takes them, `but` some."""
+    return {name: _plain(value) for name, value in asdict(record).items() if name not in but}
 
 
 def _plain(value: Any) -> Any:
