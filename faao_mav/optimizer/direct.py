@@ -116,7 +116,6 @@ def direct(
     solution = make_solution(
         problem,
         flight,
-        [link.small_scale(flight.w) for link in problem.links],
         precoders,
         [],
         converged=best.converged,

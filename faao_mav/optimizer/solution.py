@@ -272,7 +272,6 @@ def _excess(P: Complex, power: float) -> float:
 def make_solution(
     problem: Problem,
     flight: Trajectory,
-    fading: Sequence[Complex],
     precoders: Sequence[Complex],
     history: list[float],
     *,
@@ -280,7 +279,8 @@ def make_solution(
     ending: str,
     starts: Mapping[str, float] | None = None,
 ) -> Solution:
-    """Put an iterate together with its rates."""
+    """Put an iterate together with its fading and rates."""
+    fading = [link.small_scale(flight.w) for link in problem.links]
     I_U, I_G = (
         link.rates(flight.w, H_r, P)
         for link, H_r, P in zip(problem.links, fading, precoders, strict=True)
@@ -344,9 +344,6 @@ def save_solution(
     write_whole(path, buffer.getvalue())
 
 
-_TOLD = ("plan", "ending", "converged", "starts")
-
-
 def load_solution(path: str | Path) -> Solution:
     """Read what `save_solution` wrote. Raises `InputError` for anything else.
 
@@ -355,23 +352,37 @@ def load_solution(path: str | Path) -> Solution:
         ...
     faao_mav.errors.InputError: README.md: ...
     """
-    found = read_archive(path, (*_TOLD, *_ARRAYS, "shares", "gain"))
-    for name in (*_TOLD, *_ARRAYS):
+    from pydantic import TypeAdapter, ValidationError
+
+    texts, told = ("plan", "ending", "starts"), dict[str, str]()
+    required, optional = (*texts, "converged", *_ARRAYS), ("shares", "gain")
+    found = read_archive(path, (*required, *optional))
+    for name in required:
         if name not in found:
             raise InputError(f"{path}: not a result of faao-mission --save: {name} is missing")
-    plan = parse_plan(_text(found["plan"], f"{path}: plan"), f"{path} (plan)")
+    for name in texts:
+        if found[name].dtype.kind != "U" or found[name].shape:
+            kind = f"{found[name].dtype} {found[name].shape}"
+            raise InputError(f"{path}: {name}: {kind}; expected text")
+        told[name] = str(found[name])
+    plan = parse_plan(told["plan"], f"{path} (plan)")
     for name, (kinds, shape) in _expected(plan, len(found["history"].ravel())).items():
         if name in found:
             _check(found[name], kinds, shape, f"{path}: {name}")
     shares = found.get("shares")
     if shares is not None and not ((shares >= 0) & (shares <= 1)).all():
         raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
+    try:
+        starts = TypeAdapter(dict[str, float]).validate_json(told["starts"], strict=True)
+    except ValidationError:
+        said = quote(told["starts"])
+        raise InputError(f"{path}: starts: {said}; expected rates by start") from None
     arrays: dict[str, Any] = {name: found[name] for name in _ARRAYS}
     return Solution(
         problem=build_problem(plan),
         converged=bool(found["converged"]),
-        ending=_text(found["ending"], f"{path}: ending"),
-        starts=_starts(_text(found["starts"], f"{path}: starts"), f"{path}: starts"),
+        ending=told["ending"],
+        starts=starts,
         shares=shares,
         gain=float(found["gain"]) if "gain" in found else None,
         **arrays,
@@ -412,24 +423,3 @@ def _check(array: "np.ndarray[Any, Any]", kinds: str, shape: tuple[int, ...], wh
         )
     if not np.isfinite(array).all():
         raise InputError(f"{where}: expected finite numbers")
-
-
-def _text(array: "np.ndarray[Any, Any]", where: str) -> str:
-    """Return the text that `array`, of no axes, holds: NumPy does not look at its characters."""
-    if array.dtype.kind == "U" and array.shape == ():
-        code = "utf-32-be" if array.dtype.byteorder == ">" else "utf-32-le"
-        try:
-            return array.tobytes().decode(code).rstrip("\0")
-        except UnicodeDecodeError:
-            pass
-    raise InputError(f"{where}: {array.dtype} {array.shape}; expected text")
-
-
-def _starts(text: str, where: str) -> dict[str, float]:
-    """Return the rate that each start led to, of JSON `text`."""
-    from pydantic import TypeAdapter, ValidationError
-
-    try:
-        return TypeAdapter(dict[str, float]).validate_json(text, strict=True)
-    except ValidationError:
-        raise InputError(f"{where}: {quote(text)}; expected rates by start") from None

@@ -62,6 +62,9 @@ def unpacked(file: BinaryIO, names: Sequence[str]) -> dict[str, "np.ndarray[Any,
                 return None
             with archive.open(name) as member:
                 array = np.lib.format.read_array(member, allow_pickle=False)
+                if array.dtype.kind == "U":  # NumPy does not look at its characters
+                    little = array.astype(array.dtype.newbyteorder("<"))
+                    little.tobytes().decode("utf-32-le")
                 arrays[name.removesuffix(".npy")] = array
     return arrays
 

@@ -82,9 +82,10 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
             converged, ending = True, f"R_avg changed by less than {options.tolerance:g} bit/s/Hz"
             break
     best = max(reversed(iterates), key=lambda iterate: iterate.rate)
-    made = (best.flight, best.fading, best.precoders)
     history = [iterate.rate for iterate in iterates]
-    return make_solution(problem, *made, history, converged=converged, ending=ending)
+    return make_solution(
+        problem, best.flight, best.precoders, history, converged=converged, ending=ending
+    )
 
 
 def _next(problem: Problem, last: _Iterate, tell: Callable[[str], None]) -> _Iterate:
