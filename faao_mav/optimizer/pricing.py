@@ -25,28 +25,25 @@ from faao_mav.radio.rate import cutoff_rate
 SATURATED = 0.999
 """Part of N log2(rho) from which a link counts as saturated. Chosen."""
 
-_SAMPLED_PAIRS, _NOISES_PER_PAIR = 256, 64
-"""Pairs of slot and draw of which the mutual information is averaged over noises, at most, and the
-noises that each then has."""
+_NOISES_PER_PAIR, _SEEDS = 128, 4
+"""Noises that each pair of slot and draw has of which the mutual information is averaged, and sets
+of noises, whose spread is the standard error of the average over them. Chosen."""
 
-_SEEDS = 4
-"""Sets of noises, whose spread is the standard error of the average over them. Chosen."""
-
-_MOST_NOISES, _FEWEST_NOISES, _LIKELIHOODS = 1 << 15, 1 << 11, 1 << 24
-"""Noises of a set for all pairs: those that take so many likelihoods, within these bounds. Chosen:
-means over a set with the most spread by 1e-3 bit from set to set, with 64-QAM on two antennas by
-1e-2.
+_MOST_NOISES, _LIKELIHOODS = 1 << 15, 1 << 24
+"""Noises of a set for all pairs, at most, and likelihoods that they may take. Chosen: means over a
+set with the most spread by 1e-3 bit from set to set, with 64-QAM on two antennas by 1e-2.
 """
 
-_DEGREE = 5  # of the polynomial from cutoff rates to mutual information
-_DECIMALS = 9  # of the cutoff rates, bit, by which the sample is ordered; chosen
-_FRESH_DRAWS = 64  # new draws of the fading per slot where one precoder serves all draws
-_FRESH_SLOTS = 2000  # slots with new draws, at most
-_FEW_FRESH_SLOTS = 128  # the same where their rates take long: a search, noises, ...
-_FEW_CLASSES = 1000  # ... or more classes of differences than this; chosen
+_DEGREE, _DECIMALS = 5, 9
+"""The degree of the polynomial from cutoff rates to mutual information, and decimals of the cutoff
+rates, bit, by which the sample is ordered. Chosen."""
 
-_MAX_SPARE_DB = 300.0  # largest spare power that is looked for, dB: beyond any link
-_SPARE_ERROR = 0.001  # error of the spare power, dB: it is printed to 0.1. Chosen
+_FRESH_DRAWS, _FRESH_SLOTS = 64, 256
+"""New draws of the fading per slot where one precoder serves all draws, and slots with some, at
+most. Chosen."""
+
+_MAX_SPARE_DB, _SPARE_ERROR = 300.0, 0.001
+"""The largest spare power that is looked for, dB: beyond any link; and its error. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,18 +98,17 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
     The pairs of slot and draw are sampled evenly in the order of their cutoff rates. The mutual
     information is nearly a function of the cutoff rate: a polynomial through the sample, by least
     squares, stands for all pairs. The standard error of the mean, bits, is that of the noises and
-    that of what polynomials through one half of the sample are off in the other, which is left out
-    where all pairs are in the sample.
+    that of how the sample scatters about the polynomial, unless all pairs are in it.
     """
     pairs = H.shape[:-2]
     wide = np.broadcast_to(P, (*pairs, *P.shape[-2:]))
     H, P = H.reshape(-1, *H.shape[-2:]), wide.reshape(-1, *P.shape[-2:])
     cutoff = cutoff_rate(H, P, link.classes, link.noise)
-    noises = min(_MOST_NOISES, max(_FEWEST_NOISES, _LIKELIHOODS // link.classes.symbols))
-    count = min(len(H), _SAMPLED_PAIRS, noises // _NOISES_PER_PAIR)
-    evenly = np.linspace(0, len(H) - 1, count).astype(np.intp)
+    noises = min(_MOST_NOISES, _LIKELIHOODS // link.classes.symbols)
+    count = min(len(H), noises // _NOISES_PER_PAIR)
     # Rounded: the order of equal rates, and so the sample, is the same whoever sums them.
-    part = np.argsort(np.round(cutoff, _DECIMALS), kind="stable")[evenly]
+    order = np.argsort(np.round(cutoff, _DECIMALS), kind="stable")
+    part = order[np.linspace(0, len(H) - 1, count).astype(np.intp)]
     sets = np.array(
         [
             mutual_information(H[part], P[part], link.modulation, link.noise, nodes=noises, seed=k)
@@ -123,15 +119,10 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
     powers = np.vander(cutoff / link.classes.bits, _DEGREE + 1)
     fit, *_ = np.linalg.lstsq(powers[part], sample)
     fitted = np.clip(powers @ fit, 0.0, link.classes.bits)
-    variance = sets.mean(axis=1).var(ddof=1) / _SEEDS
-    if len(part) < len(H):
-        for half, other in ((0, 1), (1, 0)):
-            fit, *_ = np.linalg.lstsq(powers[part[half::2]], sample[half::2])
-            variance += (
-                np.mean((powers[part[other::2]] @ fit - sample[other::2]) ** 2) / len(part) / 2
-            )
+    scatter = np.mean((powers[part] @ fit - sample) ** 2) / count if count < len(H) else 0.0
+    error = np.sqrt(sets.mean(axis=1).var(ddof=1) / _SEEDS + scatter)
     each = fitted.reshape(-1, pairs[-1]).mean(axis=0)
-    return float(each.mean()), each, float(np.sqrt(variance))
+    return float(each.mean()), each, float(error)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,8 +141,7 @@ class FreshRates:
 def fresh_rates(solution: Solution) -> FreshRates | None:
     """Return the rates of `solution` on new draws of the fading; None unless it was averaged over.
 
-    Every slot has draws of its own, or where that takes long (large alphabets, many slots, searches
-    for precoders that know the draw) every so many slots. What is delivered is the mean over
+    At most `_FRESH_SLOTS`, evenly apart, have draws of their own. What is delivered is the mean of
     flights that have one of the draws in each slot, forwarded with the planned shares.
     """
     problem, how = solution.problem, design(solution.plan, solution.problem.precoder)
@@ -159,10 +149,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
         return None
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
     slots = len(solution.w)
-    quick = how.blind and solution.plan.optimizer.rate == "cutoff"
-    if solution.problem.uav_user.steps is None:
-        quick &= all(len(link.classes.vectors) <= _FEW_CLASSES for link in problem.links)
-    step = -(-slots // (_FRESH_SLOTS if quick else _FEW_FRESH_SLOTS))
+    step = -(-slots // _FRESH_SLOTS)
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
     found, rates = [], []

@@ -50,10 +50,6 @@ step to mu = 0 reaches (Mehrotra) ends as high, in as much time, but not where f
 _LEAST_GAP = 0.25
 """The complementarity gap per slot at the least mu, in tolerances. Chosen."""
 
-_STRICT = 1e-4
-"""The tolerance that limits are kept to where a search asks for less: so much is what their
-`inside` leaves room for."""
-
 _MOST_MISSED = 0.2
 """What a step may miss of a limit in second order, where its slack is less. Without it two of 31
 flights do not converge, in 30 % more iterations; with 0.3 one of three hard planes is 1 % worse."""
@@ -173,7 +169,6 @@ class Search:
         # what is missed in second order counts tenfold
         broken = 10 * float((system.each * np.abs(it.margin)).max())
         broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
-        broken *= max(1.0, self.tolerance / _STRICT)
         value = self._value(at)
         kept = broken < self.tolerance
         if (kept and value > self.best) or self.best == -np.inf:
