@@ -6,7 +6,7 @@ wire, so that what was sent and what was found can be compared without rounding.
 """
 
 from dataclasses import astuple, dataclass
-from typing import dataclass_transform
+from typing import TypeVar, dataclass_transform
 
 from faao_mav.mission.item import Params
 from faao_mav.wire.protocol import AIRFRAMES, ARMED, NO_AUTOPILOT, PREARM_CHECK, Address
@@ -37,6 +37,9 @@ class Message:
 
     def __init_subclass__(cls) -> None:
         dataclass(frozen=True)(cls)
+
+
+M = TypeVar("M", bound=Message)
 
 
 class Addressed(Message):
@@ -322,3 +325,7 @@ class Envelope:
     sender: Address
     message: Message
     origin: str = ""
+
+    def said(self, by: Address, kind: type[M]) -> M | None:
+        """Return the message if it is of that `kind`, and `by` that sender; else None."""
+        return self.message if self.sender == by and isinstance(self.message, kind) else None

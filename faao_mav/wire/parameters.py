@@ -85,31 +85,25 @@ def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
             room += len(names)
             questions.put(names, *(ParamRequestRead(peer.address, name, -1) for name in names))
         line.progress = "reading parameters", total - len(left) - len(questions.asked), total
-        told = _told(peer, (yield from questions.hear()))
-        if told is not None and questions.answer(names_of.get(told.param_id, ())):
+        heard = yield from questions.hear()
+        told = heard and heard.said(peer.address, ParamValue)
+        if told and questions.answer(names_of.get(told.param_id, ())):
             values[told.param_id] = value_in(told, peer.vehicle)
             kinds[told.param_id] = told.param_type
             questions.further()
     return Reading(values, (*questions.asked, *left), kinds)
 
 
-def _told(peer: Peer, heard: Envelope | None) -> ParamValue | None:
-    """Return the parameter that the vehicle of `peer` tells, None if it is something else."""
-    if heard is None or heard.sender != peer.address or not isinstance(heard.message, ParamValue):
-        return None
-    return heard.message
+def _set_parameter(peer: Peer, name: str, value: float, kind: int) -> Talk[bool]:
+    """Set a parameter; tell whether it is set.
 
-
-def set_parameter(peer: Peer, name: str, value: float, kind: int) -> Talk[bool]:
-    """Set the parameter `name` of the vehicle of `peer`; tell whether it is set.
-
-    It is told the value until it answers with it: setting it twice does no harm.
+    The vehicle is told the value until it answers with it: setting it twice does no harm.
     """
 
-    def answer(envelope: Envelope) -> ParamValue | None:
-        told = _told(peer, envelope)
-        same = told and same_value(value_in(told, peer.vehicle), value)
-        return told if told and told.param_id == name and same else None
+    def answer(heard: Envelope) -> bool | None:
+        told = heard.said(peer.address, ParamValue)
+        of_it = told and told.param_id == name and same_value(value_in(told, peer.vehicle), value)
+        return of_it or None
 
     question = ParamSet(peer.address, name, carried(value, kind, peer.vehicle), kind)
     told = yield from ask(f"setting {name}", question, answer, peer.timeouts.silence)
@@ -176,9 +170,8 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
     """
     table = () if peer.vehicle is None else peer.vehicle.parameters.values()
     groups = {tuple(each.names): each for each in table if each.name_in(wanted) is not None}
-    unknown: list[Names] = [
-        (name,) for name in wanted if not any(name in names for names in groups)
-    ]
+    known = {name for names in groups for name in names}
+    unknown: list[Names] = [(name,) for name in wanted if name not in known]
     before = Reading({})
     if not unknown:
         before = yield from read_parameters(peer, groups)
@@ -186,14 +179,16 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
     if unknown:
         names = listed([" or ".join(each) for each in unknown])
         return (), f"parameters: the vehicle has no {names}: nothing was set or uploaded"
-    asked: dict[str, float] = {}
-    for names_of_one, parameter in groups.items():
-        name = next(each for each in names_of_one if each in before.values)
-        number = number_in(parameter, name, wanted)
-        if number is not None and not same_value(number, before.values[name]):
-            asked[name] = number
+    asked = {
+        name: number
+        for names, parameter in groups.items()
+        for name in names
+        if name in before.values
+        if (number := number_in(parameter, name, wanted)) is not None
+        if not same_value(number, before.values[name])
+    }
     for name, number in asked.items():
-        if not (yield from set_parameter(peer, name, number, before.kinds[name])):
+        if not (yield from _set_parameter(peer, name, number, before.kinds[name])):
             break
     after = yield from read_parameters(peer, [(name,) for name in asked])
     changes = tuple(

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from faao_mav.wire.machine import AT_ONCE, Line, Talk
-from faao_mav.wire.messages import CommandLong, Envelope, Message, Timesync
+from faao_mav.wire.messages import CommandLong, Envelope, M, Message, Timesync
 from faao_mav.wire.protocol import Address, MavCommand
 
 K = TypeVar("K")
 T = TypeVar("T")
-M = TypeVar("M", bound=Message)
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,13 +160,9 @@ def ask(
 
 def ask_for(vehicle: Address, number: int, kind: type[M]) -> Talk[M | None]:
     """Ask `vehicle` for its message of the type `kind` and that `number`."""
-
-    def answer(heard: Envelope) -> M | None:
-        message = heard.message
-        return message if heard.sender == vehicle and isinstance(message, kind) else None
-
     question = CommandLong(vehicle, MavCommand.REQUEST_MESSAGE, 0, float(number))
-    return ask(f"asking for {kind.__name__}", question, answer)
+    what = f"asking for {kind.__name__}"
+    return ask(what, question, lambda heard: heard.said(vehicle, kind))
 
 
 def ask_alive(vehicle: Address, number: int, patience: float = 9.0) -> Talk[bool]:
@@ -178,10 +173,8 @@ def ask_alive(vehicle: Address, number: int, patience: float = 9.0) -> Talk[bool
     """
 
     def answer(heard: Envelope) -> bool | None:
-        match heard.message:
-            case Timesync(tc1=tc1, ts1=ts1) if heard.sender == vehicle and tc1 and ts1 == number:
-                return True
-        return None
+        told = heard.said(vehicle, Timesync)
+        return (told and told.tc1 != 0 and told.ts1 == number) or None
 
     said = yield from ask("asking for a sign of life", Timesync(0, number), answer, patience)
     return said is not None

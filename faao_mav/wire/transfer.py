@@ -146,12 +146,10 @@ class _Exchange(Questions[int]):
         """Return what the vehicle says of the list; None: it is over."""
         while not self.over:
             heard = yield from self.hear()
-            if heard is None or heard.sender != self._peer.address:
-                continue
-            match heard.message:
-                case ListMessage(target=to, mission_type=part) if part == self._part:
-                    if self._peer.own.takes(to):
-                        return heard.message
+            message = heard and heard.said(self._peer.address, ListMessage)
+            about_it = message and message.mission_type == self._part
+            if message and about_it and self._peer.own.takes(message.target):
+                return message
         return None
 
     def listen(self, seconds: float) -> Talk[None]:
@@ -167,11 +165,10 @@ class _Exchange(Questions[int]):
         except GeneratorExit:
             self.cancel()
             raise
-        if heard is not None and heard.sender == self._peer.address:
-            if isinstance(heard.message, Heartbeat):
-                self._peer.beat = heard.message
-            elif isinstance(heard.message, Statustext):
-                self._texts = [*self._texts[1 - _TEXTS :], heard.message.text.strip()]
+        if heard is not None:
+            self._peer.beat = heard.said(self._peer.address, Heartbeat) or self._peer.beat
+            if text := heard.said(self._peer.address, Statustext):
+                self._texts = [*self._texts[1 - _TEXTS :], text.text.strip()]
         return heard
 
     def cancel(self) -> None:

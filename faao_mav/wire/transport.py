@@ -19,7 +19,7 @@ FORMS = (
     "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
     "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
 )
-_KINDS = {"udpin": "udpin", "udp": "udpin", "udpout": "udpout", "tcp": "tcp", "tcpin": "tcpin"}
+_KINDS = {"udp": "udpin"} | {each: each for each in ("udpin", "udpout", "tcp", "tcpin")}
 """Kinds of connections, by what they are called."""
 
 _CONNECT_TIMEOUT = 5.0
@@ -45,10 +45,8 @@ _REASONS = {
 }
 """Errors of a connection that this machine can not make: the argument is to be another one."""
 
-_MAX_DATAGRAM = 65_535
-_DEFAULT_BAUD = 57_600
-"""Bits per second: what telemetry radios are delivered with."""
-
+_MAX_DATAGRAM, _DEFAULT_BAUD = 65_535, 57_600
+"""Bytes; bits per second: what telemetry radios are delivered with."""
 
 Origin: TypeAlias = str
 """Where packets come from: HOST:PORT, or "" on a line that has one other end."""
@@ -116,14 +114,14 @@ def open_transport(text: str) -> Transport:
         of_kind = _Udp if kind.startswith("udp") else _Tcp
         return of_kind(address, listens=kind.endswith("in"))
     except OSError as error:
+        if error.errno in _REASONS:
+            raise InputError(f"connection {text!r}: {_REASONS[error.errno]}") from None
         reason = error.strerror or str(error)
         if isinstance(error, ConnectionRefusedError):
             reason = "nothing listens there"
         elif isinstance(error, TimeoutError):
             reason = f"no answer within {_CONNECT_TIMEOUT:g} s"
-        wrong = LinkError if error.errno not in _REASONS else InputError
-        told = _REASONS.get(error.errno or 0, reason)
-        raise wrong(f"connection {text!r}: {told}") from None
+        raise LinkError(f"connection {text!r}: {reason}") from None
 
 
 _Place: TypeAlias = tuple[str, int]
@@ -142,13 +140,13 @@ class _Udp:
         self._target, self.listens = None if listens else address, listens
         self._senders: dict[_Place, tuple[float, Framer]] = {}
         """When each was heard last, s, and what cuts it up; who is silent longest comes first."""
-        try:
-            self._socket.setblocking(False)
-            if listens:
+        self._socket.setblocking(False)
+        if listens:
+            try:
                 self._socket.bind(address)
-        except OSError:
-            self._socket.close()
-            raise
+            except OSError:
+                self._socket.close()
+                raise
 
     def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
         if not select.select([self._socket], [], [], max(timeout, 0.0))[0]:
@@ -163,22 +161,20 @@ class _Udp:
         return found
 
     def write(self, data: bytes, to: Origin | None = None) -> None:
-        for target in self._targets(to):
+        recent = time.monotonic() - _FORGET
+        targets = [place for place, (heard, _) in self._senders.items() if heard > recent]
+        if self._target is not None:
+            targets = [self._target]
+        elif to is not None:
+            host, _, port = to.rpartition(":")
+            targets = [(host, int(port))]
+        for target in targets:
             # Full buffers and absent receivers lose datagrams: that is what retries are for.
             with contextlib.suppress(OSError):
                 self._socket.sendto(data, target)
 
     def close(self) -> None:
         self._socket.close()
-
-    def _targets(self, to: Origin | None) -> list[_Place]:
-        if self._target is not None:
-            return [self._target]
-        if to is not None:
-            host, _, port = to.rpartition(":")
-            return [(host, int(port))]
-        recent = time.monotonic() - _FORGET
-        return [address for address, (heard, _) in self._senders.items() if heard > recent]
 
     def _framer(self, address: _Place) -> Framer:
         """Return what cuts up what comes from `address`; too many forget who is silent longest."""
