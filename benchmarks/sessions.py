@@ -112,7 +112,7 @@ def equal(part: MissionType, sent: tuple[WireItem, ...], found: tuple[WireItem, 
 def on_mock(seed: int) -> str:
     """Return how the session with this seed went on a mock."""
     mission, faults = session(seed)
-    kind = ("px4", "px4-legacy-first", "ardupilot")[seed % 3]
+    kind = ("px4", "ardupilot")[seed % 2]
     mock = mock_of(kind)
     peer = peer_of(mock.behaviour.family.key)
     lists = parts(mission, peer.vehicle)

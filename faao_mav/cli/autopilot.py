@@ -37,7 +37,7 @@ def autopilot(
         ),
     ] = "udpin:127.0.0.1:14550",
     kind: Annotated[
-        Literal["ardupilot", "px4", "px4-legacy-first"],
+        Literal["ardupilot", "px4"],
         typer.Option(help="Whose manners it has."),
     ] = "ardupilot",
     aircraft: Annotated[

@@ -15,7 +15,7 @@ from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.wire_items import GLOBAL_FRAMES
 
-MockKind: TypeAlias = Literal["ardupilot", "px4", "px4-legacy-first"]
+MockKind: TypeAlias = Literal["ardupilot", "px4"]
 
 COUNT = -1
 """In `Behaviour.refusals`: instead of an item, the announcement of the list."""
@@ -38,7 +38,6 @@ class Behaviour:
         denied: the MAV_RESULT of a mode that it does not enter, and with which it does not arm.
         returns_by_mode: the types of vehicle that change their mode when a mission has them return.
         parameters: what ground stations look for beside the parameters that the package knows.
-        legacy_first: it asks with MISSION_REQUEST; PX4 until it is sent MISSION_ITEM_INT.
         numbers_lists: it tells a number for each list.
         silent_at_boot: it answers nothing about lists before it is ready.
         tells_no_place: it tells latitude and longitude 0 as long as it knows none; else nothing.
@@ -55,7 +54,6 @@ class Behaviour:
     denied: int
     returns_by_mode: frozenset[str]
     parameters: Mapping[str, float] = field(default_factory=dict)
-    legacy_first: bool = False
     numbers_lists: bool = False
     silent_at_boot: bool = False
     tells_no_place: bool = False
@@ -115,7 +113,6 @@ _ARDUPILOT = Behaviour(
     denied=4,  # failed
     returns_by_mode=frozenset({"plane"}),
     parameters={"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4},
-    legacy_first=True,
     tells_no_place=True,
     armed_inside_only=True,
 )
@@ -136,7 +133,6 @@ _PX4 = Behaviour(
 _BEHAVIOURS: dict[MockKind, Behaviour] = {
     "ardupilot": _ARDUPILOT,
     "px4": _PX4,
-    "px4-legacy-first": replace(_PX4, legacy_first=True),
 }
 
 

@@ -56,7 +56,7 @@ class StoredLists:
         self._ready, self._flying = ready, flying
         self._items: dict[MissionType, tuple[WireItem, ...]] = dict.fromkeys(MissionType, ())
         self._alone = not self._manners.any_request_order
-        self._legacy, self._now = behaviour.legacy_first, 0.0
+        self._legacy, self._now = True, 0.0
         self._busy = MavResult.ERROR if self._alone else MavResult.DENIED
         self.reset()
 

@@ -11,7 +11,7 @@ from wire_targets import wire_targets
 
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
          "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
-TAPES = {"client": 50, "mock_ardupilot": 20, "mock_px4": 10, "mock_px4_legacy_first": 5,
+TAPES = {"client": 50, "mock_ardupilot": 20, "mock_px4": 15,
          "signed": 150}  # fmt: skip
 CASES = dict.fromkeys(FILES, 300) | TAPES
 """Cases of each target in the suite; chosen: half a second, but for PX4's predicted flights."""

@@ -52,7 +52,7 @@ from faao_mav.wire.upload_text import upload_text
 from faao_mav.wire.wire_items import mission_of, wire_items
 
 _VEHICLE = Address(1, 1)
-_KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
+_KINDS: tuple[MockKind, ...] = ("ardupilot", "px4")
 _HOME = Home(-35.363262, 149.165237, 584.0)
 
 _MISSION = Mission(
@@ -96,7 +96,7 @@ def wire_targets() -> dict[str, Target]:
         def serve(content: bytes, kind: MockKind = kind) -> object:
             return _serve(kind, content)
 
-        found.append(Target(f"mock_{kind.replace('-', '_')}", serve, [tape], mutated))
+        found.append(Target(f"mock_{kind}", serve, [tape], mutated))
     genuine = packed(Codec(_VEHICLE, _signing()), [_said(number) for number in range(20)])
     found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
     return {target.name: target for target in found}

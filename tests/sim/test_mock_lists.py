@@ -63,7 +63,7 @@ def upload(desk: Desk, rows: Sequence[WireItem], sender: Address = GROUND_STATIO
     [
         ("ardupilot", "copter", "arducopter"),
         ("ardupilot", "plane", "arduplane"),
-        ("px4-legacy-first", "copter", "px4"),
+        ("px4", "copter", "px4"),
     ],
 )
 def test_the_mock_answers_as_the_real_one(kind: str, aircraft: str, real: str) -> None:
@@ -125,8 +125,7 @@ def test_what_is_no_list_or_comes_before_it_is_ready() -> None:
 
 
 def test_px4_changes_its_request_when_told_unsupported_and_is_freed_by_a_cancellation() -> None:
-    assert not desk_for("px4").tell(count(3))[0].legacy
-    desk = desk_for("px4-legacy-first")
+    desk = desk_for("px4")
     (request,) = desk.tell(count(3))
     (other,) = desk.tell(MissionAck(VEHICLE, 0, MavResult.UNSUPPORTED))
     assert (request.legacy, other.legacy, other.seq) == (True, False, 0)

@@ -28,7 +28,7 @@ from faao_mav.wire.wire_items import wire_items
 
 VEHICLE = Address(1, 1)
 FOREIGN = Address(250, 190)
-KINDS: tuple[MockKind, ...] = ("ardupilot", "px4", "px4-legacy-first")
+KINDS: tuple[MockKind, ...] = ("ardupilot", "px4")
 HOME = Home(-35.363262, 149.165237, 584.0)
 FENCE = Fence(
     (Polygon(((-35.3, 149.1), (-35.4, 149.1), (-35.4, 149.2)), inclusion=True),),

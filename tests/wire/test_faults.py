@@ -101,17 +101,18 @@ def test_a_link_that_dies_for_3_s_is_overcome_and_for_a_minute_reported(kind: Mo
     assert (report.verdict, report.attempts) == ("silent", 3)
 
 
-@pytest.mark.parametrize(("kind", "ask"), [("ardupilot", REQUEST), ("px4", REQUEST_INT)])
-def test_any_one_packet_may_be_lost(kind: MockKind, ask: int) -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_one_packet_may_be_lost(kind: MockKind) -> None:
     """The last acknowledgement too, which PX4 repeats and ArduPilot does not."""
-    for lost in ((ask, 1), (ask, 4), (ITEM_INT, 4), (COUNT_ID, 1), (MISSION_ACK, 1)):
+    asks = [(ask, number) for ask in (REQUEST, REQUEST_INT) for number in range(1, 5)]
+    for lost in (*asks, (ITEM_INT, 4), (COUNT_ID, 1), (MISSION_ACK, 1)):
         report, took = upload_to(mock_of(kind), rows_for(kind, 4), lost=lost)
         assert (report.verified, report.attempts) == (True, 1)
         assert not report.result
         assert took < 2
 
 
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_refusals_of_every_kind_are_reported(kind: MockKind) -> None:
     cancelled = MavResult.OPERATION_CANCELLED
     for result in sorted(set(MavResult) - {MavResult.ACCEPTED, MavResult.INVALID_SEQUENCE}):
@@ -125,7 +126,7 @@ def test_refusals_of_every_kind_are_reported(kind: MockKind) -> None:
                 assert report.item == (None if seq == COUNT else seq)
 
 
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_item_that_is_refused_is_named_whatever_is_lost(kind: MockKind) -> None:
     for seed in range(10):
         mock = mock_of(behaviour_of(kind, refusals={(MISSION, 6): MavResult.INVALID_PARAM2}))
@@ -134,7 +135,7 @@ def test_the_item_that_is_refused_is_named_whatever_is_lost(kind: MockKind) -> N
         assert report.item == 6 or report.result != MavResult.INVALID_PARAM2
 
 
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_another_ground_station_uploads_something_else_at_the_same_time(kind: MockKind) -> None:
     """One of the two is refused, or both come in turn: nobody is told a wrong thing."""
     for head_start in range(4):
@@ -149,7 +150,7 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind: Mo
             assert report.verdict in ("refused", "different", "unread")
 
 
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_late_packets_and_copies_of_them_end_no_upload(kind: MockKind) -> None:
     for seed in range(6):
         mock, rows = mock_of(kind), rows_for(kind, 30)

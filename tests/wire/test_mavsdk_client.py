@@ -46,7 +46,7 @@ def found_places(items: list[SdkItem]) -> list[tuple[int, int, int, float]]:
     return [(item.command, item.x, item.y, item.z) for item in items]
 
 
-@pytest.fixture(scope="module", params=["ardupilot", "px4", "px4-legacy-first"])
+@pytest.fixture(scope="module", params=["ardupilot", "px4"])
 def flown(request: pytest.FixtureRequest) -> Iterator[tuple[MockAutopilot, MissionRaw]]:
     kind: MockKind = request.param
     port = free_port()
