@@ -82,15 +82,6 @@ def height(desk: Desk, seconds: float) -> float:
 
 
 @BOTH
-def test_a_heartbeat_a_second_that_tells_booting_from_ready(kind: MockKind) -> None:
-    desk = desk_for(kind, boot=3.0)
-    desk.wait(6.0)
-    beats = only(desk.sent, Heartbeat)
-    assert [beat.system_status for beat in beats] == [2, 2, 2, 3, 3, 3, 3]
-    assert {beat.autopilot for beat in beats} == {3 if kind == "ardupilot" else 12}
-
-
-@BOTH
 def test_a_whole_flight(kind: MockKind) -> None:
     """A waypoint before a DO is told by the number of that."""
     items = list(a_mission(12).items)

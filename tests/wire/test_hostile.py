@@ -19,7 +19,7 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire import download, upload
+from faao_mav.wire import upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import choose, discover
 from faao_mav.wire.machine import Script
@@ -28,7 +28,6 @@ from faao_mav.wire.messages import (
     CommandLong,
     Envelope,
     Heartbeat,
-    HomePosition,
     Message,
     MissionAck,
     MissionItemInt,
@@ -79,23 +78,6 @@ def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded(
 ) -> None:
     with pytest.raises(InputError, match=message):
         mission_of({part: rows}, vehicle_of("px4"))
-
-
-class _Homeless(MockAutopilot):
-    """It says that it stands off the Earth."""
-
-    def _asked_for(self, _: int) -> list[Message]:
-        return [HomePosition(2_000_000_000, 0, 0)]
-
-
-def test_a_home_off_the_earth_is_not_downloaded() -> None:
-    mock = _Homeless(behaviour_of("px4"), home=HOME, beat=0.1)
-    source = f"udpout:127.0.0.1:{(port := free_port())}"
-    with (
-        running(mock, f"udpin:127.0.0.1:{port}"),
-        pytest.raises(LinkError, match=r"holds is no mission: home: 200\.0, 0\.0"),
-    ):
-        download(source, system=1)
 
 
 def test_a_crowd_of_vehicles_is_told_in_a_few_lines() -> None:

@@ -20,7 +20,6 @@ from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import Timeouts, download, upload
-from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import FoundVehicle, Heard, choose, discover
 from faao_mav.wire.framing import message_id, sender_of
@@ -164,19 +163,6 @@ def test_two_vehicles_of_one_number_are_not_one(monkeypatch: pytest.MonkeyPatch)
     assert [(mock.armed, mock.mission().items) for mock in vehicles.values()] == [(False, ())] * 2
 
 
-def test_another_vehicle_is_noticed_by_whatever_it_says() -> None:
-    """Its heartbeat may be lost."""
-    search: Any = Script(discover())
-    search.start(0.0)
-    search.on(Envelope(VEHICLE, BEAT, HERE), 0.1)
-    search.on(Envelope(VEHICLE, Statustext(6, "hello"), ELSEWHERE), 0.5)
-    search.tick(1.5)
-    (vehicle,) = search.outcome.vehicles
-    assert vehicle.origins == (HERE, ELSEWHERE)
-    with pytest.raises(LinkError, match=f"is heard from {HERE} and {ELSEWHERE}"):
-        choose(search.outcome, "udpin:0.0.0.0:14550", None, None, 10.0)
-
-
 def test_nothing_is_started_that_has_a_namesake() -> None:
     scene = Scene("px4", arm=True)
     scene.watch.seen.strangers = {ELSEWHERE}
@@ -307,24 +293,3 @@ def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> N
         upload(a_mission(5), "udpin:0.0.0.0:1", system=1, timeouts=HASTY)
     assert "SERIALn_PROTOCOL 2" in str(told.value)
     assert "\n" not in str(told.value)
-
-
-def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
-    """ArduPilot with SERIALn_PROTOCOL 1 or PX4 with MAV_PROTO_VER 1."""
-    pack = Codec.pack
-
-    def old(codec: Codec, message: Message) -> bytes:
-        packet = pack(codec, message)
-        if codec.address != VEHICLE:
-            return packet
-        decoded = common.MAVLink(None).decode(bytearray(packet))
-        if hasattr(decoded, "mission_type"):
-            decoded.mission_type = 0  # MAVLink 1 has no such field
-        return bytes(decoded.pack(common.MAVLink(None, 1, 1), force_mavlink1=True))
-
-    monkeypatch.setattr(Codec, "pack", old)
-    in_the_air(monkeypatch, {HERE: a_mock(rate=0.0)})
-    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1).verified
-    held = holdings("udpin:0.0.0.0:1", system=1, timeouts=HASTY)
-    assert len(held.mission.items) == 5
-    assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about

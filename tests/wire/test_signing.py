@@ -95,16 +95,6 @@ def test_a_first_packet_is_at_most_a_minute_late_and_after_what_is_remembered() 
     assert signing(latest=before.latest).judge(signed(NOW - 19), VEHICLE) == "signed"
 
 
-def test_times_of_sent_packets_grow_whatever_the_clock_does() -> None:
-    clock = iter([NOW, NOW, NOW - 1000, NOW - 1000])
-    sender = signing(clock=lambda: next(clock))
-    ticks = [sender.next_tick() for _ in range(3)]
-    assert ticks == [ticks[0], ticks[0] + 1, ticks[0] + 2]
-    heard = signing(clock=lambda: NOW)
-    heard.judge(signed(NOW + 50), VEHICLE)
-    assert heard.next_tick() == ticks[0] + 5_000_001  # the guide: after all that was heard
-
-
 def test_what_is_no_key_file_or_is_not_its_owners_alone_is_refused(key_file: Path) -> None:
     assert read_signing(key_file).key == KEY
     key_file.write_text(KEY.hex() + "\n")

@@ -94,16 +94,6 @@ def test_a_bridge_may_cut_packets_anywhere(udp: Port) -> None:
     assert udp.received() == [packet_of(LONG), packet_of(), packet_of(LONG)]
 
 
-def test_who_sends_without_end_is_read_a_burst_at_a_time(
-    udp: Port, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("faao_mav.wire.transport._BURST", 10)
-    peer = udp.peer()
-    for _ in range(25):
-        peer.send(packet_of())
-    assert [len(udp.transport.read(0.05)) for _ in range(3)] == [10, 10, 5]
-
-
 def test_of_too_many_tcp_clients_the_first_are_served(tcp: Port) -> None:
     """`select` knows no file descriptor above 1023: a thousand clients would end a mock."""
     peers = []
