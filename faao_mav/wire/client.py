@@ -26,7 +26,7 @@ from faao_mav.wire.protocol import (
     MissionType,
     meaning,
 )
-from faao_mav.wire.questions import Timeouts, ask_alive, ask_for
+from faao_mav.wire.questions import ask_alive, ask_for
 from faao_mav.wire.signing import Verdict, read_signing, remember
 from faao_mav.wire.transfer import PartReport, Peer
 from faao_mav.wire.transport import parse_connection
@@ -65,7 +65,6 @@ class LinkOptions(TypedDict, total=False):
     log: Path | None
     signing_key: Path | None
     wait: float
-    timeouts: Timeouts | None
     observe: Observe | None
     note: Callable[[str], object] | None
 
@@ -240,15 +239,14 @@ class Session(WireLink):
             note=options.get("note") or warnings.warn,
             observe=options.get("observe") or (lambda *_: None),
         )
-        timeouts = options.get("timeouts") or Timeouts()
         try:
             self.found = self._found(connection, knocks, options)
             self.bind(self.found.address, *self.found.origins)
-            self._check_alive(connection, timeouts)
+            self._check_alive(connection)
         except BaseException:
             self.close()
             raise
-        self.peer = Peer(self.address, self.found.address, self.found.vehicle, timeouts=timeouts)
+        self.peer = Peer(self.address, self.found.address, self.found.vehicle)
 
     def close(self) -> None:
         """Let go of the link; say what became of the log, keep the time of the last packet."""
@@ -269,12 +267,12 @@ class Session(WireLink):
                 raise LinkError(f"{connection}: no vehicle: {told}")
         return choose(heard, connection, *which, wait)
 
-    def _check_alive(self, connection: str, timeouts: Timeouts) -> None:
+    def _check_alive(self, connection: str) -> None:
         """Raise `LinkError` for a recording, and for a vehicle that does not read MAVLink 2."""
         old = self.found.address not in self.codec.modern
         if self._signing is None and not old:
             return
-        if self.run(ask_alive(self.found.address, secrets.randbits(62), timeouts.silence)):
+        if self.run(ask_alive(self.found.address, secrets.randbits(62))):
             return
         why = (
             "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "

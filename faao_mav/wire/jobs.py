@@ -7,7 +7,15 @@ from faao_mav.mission.item import Mission
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MavResult, MissionType, listed, meaning
-from faao_mav.wire.transfer import TENTATIVE, PartReport, Peer, Verdict, read_list, send_list
+from faao_mav.wire.transfer import (
+    ATTEMPTS,
+    TENTATIVE,
+    PartReport,
+    Peer,
+    Verdict,
+    read_list,
+    send_list,
+)
 from faao_mav.wire.verify import compare
 from faao_mav.wire.wire_items import autopilot_name, home_items
 
@@ -31,7 +39,7 @@ def upload_parts(
     It stops at the first failure. That a list cannot be cleared which the vehicle does not have at
     all is none. A transfer that the link broke is begun again, and one whose last answer was lost
     or whose list reads back differently too (ArduPilot now and then loses a fence that it
-    accepted), at most `Timeouts.attempts` times. A refusal is final, except one that may be about
+    accepted), at most `ATTEMPTS` times. A refusal is final, except one that may be about
     something else.
     """
     reports: list[PartReport] = []
@@ -68,11 +76,7 @@ def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> 
         # DENIED, but not if it is said of every announcement of a whole attempt.
         passes = doubtful and not (report.result == MavResult.DENIED and report.item is None)
         refused = report.verdict == "refused" and not passes
-        if (
-            refused
-            or report.verdict in ("verified", "armed")
-            or (attempt == peer.timeouts.attempts)
-        ):
+        if refused or report.verdict in ("verified", "armed") or (attempt == ATTEMPTS):
             return report
 
 

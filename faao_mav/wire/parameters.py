@@ -15,7 +15,7 @@ from faao_mav.errors import InputError
 from faao_mav.wire.machine import AT_ONCE, Talk
 from faao_mav.wire.messages import Envelope, ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.protocol import listed
-from faao_mav.wire.questions import Pace, Questions, ask
+from faao_mav.wire.questions import SILENCE, Pace, Questions, ask
 from faao_mav.wire.transfer import Peer
 
 Names: TypeAlias = tuple[str, ...]
@@ -106,7 +106,7 @@ def _set_parameter(peer: Peer, name: str, value: float, kind: int) -> Talk[bool]
         return of_it or None
 
     question = ParamSet(peer.address, name, carried(value, kind, peer.vehicle), kind)
-    told = yield from ask(f"setting {name}", question, answer, peer.timeouts.silence)
+    told = yield from ask(f"setting {name}", question, answer, SILENCE)
     return told is not None
 
 

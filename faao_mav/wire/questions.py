@@ -12,17 +12,8 @@ K = TypeVar("K")
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Timeouts:
-    """When a transfer is given up.
-
-    `silence` is how many seconds it may get no further: PX4 asks again for 5 s, ArduPilot for 8 s.
-    `attempts` is how often it is begun.
-    """
-
-    silence: float = 9.0
-    attempts: int = 3
-
+SILENCE = 9.0
+"""Seconds that a transfer may get no further: PX4 asks again for 5 s, ArduPilot for 8 s."""
 
 _FIRST, SLOWEST = 0.25, 1.5
 """Seconds after which a question is put again while it is not known how long answers take, and at
@@ -165,7 +156,7 @@ def ask_for(vehicle: Address, number: int, kind: type[M]) -> Talk[M | None]:
     return ask(what, question, lambda heard: heard.said(vehicle, kind))
 
 
-def ask_alive(vehicle: Address, number: int, patience: float = 9.0) -> Talk[bool]:
+def ask_alive(vehicle: Address, number: int) -> Talk[bool]:
     """Ask for the answer to a `number` that nobody could know before; tell whether it comes.
 
     One that reads MAVLink 1 alone does not give it. On a link that is signed a recording cannot,
@@ -176,5 +167,5 @@ def ask_alive(vehicle: Address, number: int, patience: float = 9.0) -> Talk[bool
         told = heard.said(vehicle, Timesync)
         return (told and told.tc1 != 0 and told.ts1 == number) or None
 
-    said = yield from ask("asking for a sign of life", Timesync(0, number), answer, patience)
+    said = yield from ask("asking for a sign of life", Timesync(0, number), answer, SILENCE)
     return said is not None

@@ -21,13 +21,16 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import Address, MavResult, MissionType
-from faao_mav.wire.questions import SLOWEST, Pace, Questions, Timeouts
+from faao_mav.wire.questions import SILENCE, SLOWEST, Pace, Questions
 from faao_mav.wire.verify import Difference
 
 Verdict: TypeAlias = Literal[
     "accepted", "unknown", "verified", "different", "unread", "refused", "silent", "armed",
     "cancelled",
 ]  # fmt: skip
+
+ATTEMPTS = 3
+"""How often a transfer is begun that gets no further; chosen."""
 
 TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
 """Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
@@ -64,7 +67,6 @@ class Peer:
     address: Address
     vehicle: VehicleType | None
     may_be_armed: bool = False
-    timeouts: Timeouts = field(default_factory=Timeouts)
     pace: Pace = field(default_factory=Pace)
     late: float = 0.0
     beat: Heartbeat | None = None
@@ -111,7 +113,7 @@ class _Exchange(Questions[int]):
     """One list on its way: its questions, and what the vehicle says."""
 
     def __init__(self, line: Line, peer: Peer, part: MissionType, *, writes: bool) -> None:
-        super().__init__(line, peer.pace, peer.timeouts.silence)
+        super().__init__(line, peer.pace, SILENCE)
         self._peer, self._part = peer, part
         self._writes = writes and not peer.may_be_armed
         self._texts: list[str] = []
@@ -196,7 +198,11 @@ class _Exchange(Questions[int]):
 
 
 def send_list(
-    items: Sequence[WireItem], peer: Peer, part: MissionType = MissionType.MISSION
+    items: Sequence[WireItem],
+    peer: Peer,
+    part: MissionType = MissionType.MISSION,
+    *,
+    in_pairs: bool = True,
 ) -> Talk[PartReport]:
     """Upload `items`, or clear the list where there are none; the vehicle leads.
 
@@ -205,7 +211,7 @@ def send_list(
       the request for the next one was.
     - PX4 takes the item that it waits for and passes over any other, so it is sent the next one
       too, whichever was lost, but never the last one unasked. If it refuses one of the two, it is
-      not known which: the upload begins anew, one item at a time.
+      not known which: the upload begins anew, not `in_pairs`.
     - ArduPilot says INVALID_SEQUENCE of an item that it has, and is sent the next one.
     - An ERROR may be about a duplicate too (PX4: of MISSION_COUNT), and DENIED about a late request
       of a download before: they count when nothing more is asked for.
@@ -214,16 +220,8 @@ def send_list(
     """
     line = yield AT_ONCE
     exchange, last = _Exchange(line, peer, part, writes=True), len(items) - 1
-    opening = MissionCount(peer.address, part, len(items))
     what = f"{'uploading' if items else 'clearing'} {part.title}"
-    pairs = peer.manners.ignores_other_items
-
-    def begin() -> tuple[int, int]:
-        exchange.asked.clear()
-        exchange.further()
-        if not exchange.over:
-            exchange.put(_OPENING, opening if items else MissionClearAll(peer.address, part))
-        return _OPENING, _OPENING
+    pairs = in_pairs and peer.manners.ignores_other_items
 
     def send(seq: int) -> None:
         numbers = (seq + 1, seq) if pairs and seq + 1 < last else (seq,)
@@ -232,7 +230,10 @@ def send_list(
         if peer.vehicle is None:
             exchange.asked.clear()
 
-    current, furthest = begin()
+    current = furthest = _OPENING
+    if not exchange.over:
+        count = MissionCount(peer.address, part, len(items))
+        exchange.put(_OPENING, count if items else MissionClearAll(peer.address, part))
     while True:
         line.progress = what, furthest + 1, len(items)
         exchange.item = None if current == _OPENING else current
@@ -261,7 +262,7 @@ def send_list(
                     send(current)
             case MissionAck() if pairs and exchange.times(current) > 1 and current != _OPENING:
                 exchange.cancel()
-                pairs, (current, furthest) = False, begin()
+                return (yield from send_list(items, peer, part, in_pairs=False))
             case MissionAck(type=result) if result in TENTATIVE:
                 exchange.doubt(result)
             case MissionAck(type=MavResult.OPERATION_CANCELLED as result):
@@ -281,12 +282,12 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
     (`handle_mission_request_int`): like MAVProxy, this asks it for up to five items at once, once
     it is known how long answers take.
 
-    When it gets no further it begins anew, `Timeouts.attempts` times. As a request that came late
+    When it gets no further it begins anew, `ATTEMPTS` times. As a request that came late
     may have ended it, each item is then waited for some time longer.
     """
     line = yield AT_ONCE
     exchange, wide = _Exchange(line, peer, part, writes=False), peer.manners.any_request_order
-    for _ in range(peer.timeouts.attempts):
+    for _ in range(ATTEMPTS):
         items, count, number, following = dict[int, WireItem](), -1, 0, 0
         exchange.asked.clear()
         exchange.further()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+import pytest
 from simulate import Station, simulate
 
 from faao_mav.autopilot import VehicleType, vehicle_type
@@ -46,6 +47,17 @@ def vehicle_of(kind: str) -> VehicleType | None:
 
 def peer_of(kind: str) -> Peer:
     return Peer(GROUND_STATION, VEHICLE, vehicle_of(kind))
+
+
+def hurry(monkeypatch: pytest.MonkeyPatch, silence: float = 0.3) -> None:
+    """Have transfers given up soon."""
+    for name, value in (
+        ("questions.SILENCE", silence),
+        ("transfer.SILENCE", silence),
+        ("transfer.ATTEMPTS", 1),
+        ("jobs.ATTEMPTS", 1),
+    ):
+        monkeypatch.setattr(f"faao_mav.wire.{name}", value)
 
 
 def signing_key(phrase: str) -> bytes:

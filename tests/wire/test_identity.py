@@ -13,13 +13,13 @@ from mock_flights import fly as flies
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 from scenes import Scene
-from stations import HOME, VEHICLE, Air, a_mission
+from stations import HOME, VEHICLE, Air, a_mission, hurry
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.wire import Timeouts, download, upload
+from faao_mav.wire import download, upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import FoundVehicle, Heard, choose, discover
 from faao_mav.wire.framing import message_id, sender_of
@@ -36,7 +36,6 @@ COPTER, ARDUPILOT, ARMED = 2, 3, 128
 BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
 COMPANION = Address(1, 191)
 HERE, ELSEWHERE = "192.0.2.1:14550", "192.0.2.7:14550"
-HASTY = Timeouts(attempts=1, silence=0.3)
 
 
 def a_mock(system: int = 1, **options: Any) -> MockAutopilot:
@@ -206,9 +205,8 @@ def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
         if what.startswith("uploading") and done == 2 and HERE in vehicles:
             vehicles[ELSEWHERE] = vehicles.pop(HERE)
 
-    report = upload(
-        a_mission(9), "udpin:0.0.0.0:1", observe=observe, note=notes.append, timeouts=HASTY
-    )
+    hurry(monkeypatch)
+    report = upload(a_mission(9), "udpin:0.0.0.0:1", observe=observe, note=notes.append)
     assert [part.verdict for part in report.parts] == ["silent"]
     assert ELSEWHERE in notes[0]
     assert "If the vehicle's address has changed, begin again" in notes[0]
@@ -252,7 +250,9 @@ def test_a_vehicle_that_takes_orders_of_one_number_only(monkeypatch: pytest.Monk
             return super()._receive(envelope, now) if envelope.sender.system == 255 else ()
 
     air = in_the_air(monkeypatch, {HERE: Strict(behaviour_of("ardupilot"), home=HOME)})
-    report = upload(a_mission(5), "udpin:0.0.0.0:1", system=1, timeouts=HASTY)
+    with monkeypatch.context() as patch:
+        hurry(patch)
+        report = upload(a_mission(5), "udpin:0.0.0.0:1", system=1)
     assert "orders of only MAV_GCS_SYSID" in report.problems[0]
     assert "--own-system" in report.problems[0]
     assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1, own_system=255).verified
@@ -289,7 +289,8 @@ def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> N
     packet = beat.pack(common.MAVLink(None, 1, 1), force_mavlink1=True)
     air = Air(lambda data: [] if data is None else [(packet, HERE)])
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
+    hurry(monkeypatch)
     with pytest.raises(LinkError, match="it speaks MAVLink 1 only, and does not answer") as told:
-        upload(a_mission(5), "udpin:0.0.0.0:1", system=1, timeouts=HASTY)
+        upload(a_mission(5), "udpin:0.0.0.0:1", system=1)
     assert "SERIALn_PROTOCOL 2" in str(told.value)
     assert "\n" not in str(told.value)

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from mock_flights import fly
 from pymavlink.dialects.v20 import common
 from served import running
-from stations import HOME, VEHICLE, Air, a_mission, signing_key
+from stations import HOME, VEHICLE, Air, a_mission, hurry, signing_key
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.wire import Timeouts, upload
+from faao_mav.wire import upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.messages import Statustext
 from faao_mav.wire.protocol import GROUND_STATION
@@ -29,8 +29,6 @@ KEY = signing_key("open sesame")
 TEXT = Statustext(6, "hello")
 NOW = 1_800_000_000.0
 """A time after 2015, s since 1970."""
-
-HASTY = Timeouts(attempts=1, silence=0.5)
 
 
 @pytest.fixture
@@ -125,12 +123,13 @@ def test_the_last_time_is_kept_beside_the_key(key_file: Path) -> None:
             read_signing(key_file)
 
 
-def test_a_signed_session(key_file: Path) -> None:
+def test_a_signed_session(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     connection = f"udpout:127.0.0.1:{(port := free_port())}"
     with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
         for _ in range(2):  # the second is after what is remembered of the first
             assert upload(a_mission(5), connection, system=1, signing_key=key_file).verified
-        report = upload(a_mission(5), connection, system=1, timeouts=HASTY)
+        hurry(monkeypatch, 0.5)
+        report = upload(a_mission(5), connection, system=1)
         assert not report.verified
         assert "signs its packets" in report.problems[-1]
 
@@ -185,9 +184,10 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
     monkeypatch.setattr(link, lambda _: Air(played, listens=False))
     if not remembered:
         key_file.with_name("key.last").unlink()
+    hurry(monkeypatch, 0.5)
     told = "no vehicle: packets come .* of a recording" if remembered else "a recording of it"
     with pytest.raises(LinkError, match=told):
-        put(wait=1.0, timeouts=HASTY)
+        put(wait=1.0)
 
 
 @pytest.mark.parametrize(

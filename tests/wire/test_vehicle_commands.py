@@ -10,7 +10,7 @@ import pytest
 import typer
 from conftest import free_port
 from served import running
-from stations import FENCE, HOME, RALLY, a_mission, vehicle_of
+from stations import FENCE, HOME, RALLY, a_mission, hurry, vehicle_of
 from typer.testing import CliRunner, Result
 
 from faao_mav.cli.autopilot import autopilot
@@ -20,7 +20,6 @@ from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.formats import read_mission, read_mission_file, write_wpl
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire import Timeouts
 from faao_mav.wire import download as get
 from faao_mav.wire.messages import Envelope, MissionRequestList
 from faao_mav.wire.protocol import MavResult, MissionType
@@ -165,8 +164,7 @@ class Reticent(MockAutopilot):
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
     """A command that soon gives up."""
-    quick = Timeouts(attempts=1, silence=0.3)
-    monkeypatch.setattr("faao_mav.wire.client.Timeouts", lambda: quick)
+    hurry(monkeypatch)
 
 
 @pytest.mark.usefixtures("hasty")
