@@ -72,10 +72,9 @@ def fly(
     from faao_mav.autopilot.files import made_for
     from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.fly.fly import fly_mission
-    from faao_mav.fly.radio import Radios
     from faao_mav.fly.seen import Flight
     from faao_mav.fly.telemetry import POSITION_RATE
-    from faao_mav.fly.telling import HEADER, Telling, as_text
+    from faao_mav.fly.telling import HEADER, Radios, Telling, as_text
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.summary import joined
     from faao_mav.validate.check import predicted
@@ -168,7 +167,7 @@ def debrief(
     inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     check_outputs({"--report": report}, inputs)
     from faao_mav.fly.logs import read_log
-    from faao_mav.fly.radio import Radios
+    from faao_mav.fly.telling import Radios
     from faao_mav.report.debrief import FromLog
     from faao_mav.report.summary import joined
     from faao_mav.workflow import Result, with_mission

@@ -214,10 +214,16 @@ class Telemetry:
                 self._needed[LOCAL_POSITION], self.knows_place = now, True
             case MissionCurrent():
                 self._needed[CURRENT_ITEM] = now
-                self._on_current(message)
+                known, self.current = self.current or message, message
+                same = (message.total, message.mission_id) == (known.total, known.mission_id)
+                if self._rows and not (same and message.total in (0, self.items)):
+                    self._end("changed", "the vehicle's mission is another one now than the file's")
             case MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
-                if self._home <= seq < len(self._rows):
-                    self._hold((*self._rows[:seq], item, *self._rows[seq + 1 :]))
+                rows = (*self._rows[:seq], item, *self._rows[seq + 1 :])
+                held = self._home <= seq < len(self._rows)
+                found = compare(self._rows, rows, MissionType.MISSION, self.vehicle) if held else ()
+                for wrong in (each for each in found if each.kind == "wrong"):
+                    self._end("changed", f"the vehicle's mission is another one now: {wrong}")
             case Statustext(severity=severity, text=text) if severity <= MavSeverity.WARNING:
                 self.said.append(text.strip())
                 self.told.append(f"the vehicle says: {text.strip()}")
@@ -257,18 +263,6 @@ class Telemetry:
                 self._needed[POSITION] = now
             home = (message.alt - message.relative_alt) / 1000
             self.fixes.append(Fix(t / 1000, place.latitude, place.longitude, place.altitude, home))
-
-    def _on_current(self, message: MissionCurrent) -> None:
-        known, self.current = self.current or message, message
-        same = (message.total, message.mission_id) == (known.total, known.mission_id)
-        if self._rows and not (same and message.total in (0, self.items)):
-            self._end("changed", "the vehicle's mission is another one now than the file's")
-
-    def _hold(self, rows: Sequence[WireItem]) -> None:
-        """Compare the mission that it holds now with the one that it held before."""
-        found = compare(self._rows, rows, MissionType.MISSION, self.vehicle)
-        for wrong in (each for each in found if each.kind == "wrong"):
-            self._end("changed", f"the vehicle's mission is another one now: {wrong}")
 
     def _end(self, kind: Kind, text: str) -> None:
         self.ending = self.ending or Ending(kind, text)

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.flight_path import FlightPath, Flown
+from faao_mav.autopilot.flight_path import STEP, Copter, FlightPath, Flown, Samples
 from faao_mav.autopilot.px4.guidance import (
     Axis,
     GuidedLeg,
@@ -19,7 +19,6 @@ from faao_mav.autopilot.px4.guidance import (
     level_setpoint,
 )
 from faao_mav.autopilot.px4.parameters import Px4Limits
-from faao_mav.autopilot.stepper import STEP, Copter, Samples
 
 POSITION_GAIN = 0.95
 """MPC_XY_P, 1/s."""

@@ -10,8 +10,7 @@ from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, ramp
 from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
 from faao_mav.autopilot.ardupilot.copter.target import Target
-from faao_mav.autopilot.flight_path import FlightPath, Flown
-from faao_mav.autopilot.stepper import STEP, Copter, Samples
+from faao_mav.autopilot.flight_path import STEP, Copter, FlightPath, Flown, Samples
 from faao_mav.errors import InputError
 
 _MARGIN = 0.05

@@ -7,7 +7,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, largest
 from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
-from faao_mav.autopilot.stepper import STEP
+from faao_mav.autopilot.flight_path import STEP
 
 _POINT = 1e-6
 """The length, m, below which a leg is none: its end counts as reached where it begins."""

@@ -10,9 +10,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
-from faao_mav.autopilot.flight_path import FlightPath, Flown
+from faao_mav.autopilot.flight_path import STEP, FlightPath, Flown, Samples
 from faao_mav.autopilot.model import Model, SpeedRates, parameter
-from faao_mav.autopilot.stepper import STEP, Samples
 from faao_mav.power import GRAVITY
 
 _TURN = 1.2
