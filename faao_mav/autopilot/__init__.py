@@ -22,9 +22,7 @@ from faao_mav.autopilot.vehicle import unregister as unregister
 from faao_mav.autopilot.vehicle import vehicle_type as vehicle_type
 from faao_mav.autopilot.vehicle import vehicle_type_by_numbers as vehicle_type_by_numbers
 from faao_mav.autopilot.vehicle import vehicle_types as vehicle_types
-from faao_mav.autopilot.vehicle_type import Autopilot as Autopilot
 from faao_mav.autopilot.vehicle_type import AutopilotFamily as AutopilotFamily
-from faao_mav.autopilot.vehicle_type import Kind as Kind
 from faao_mav.autopilot.vehicle_type import VehicleType as VehicleType
 
 for _vehicle_type in (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE):

@@ -11,7 +11,7 @@ from faao_mav.autopilot.vehicle import (
     kind_by_number,
     vehicle_type_by_numbers,
 )
-from faao_mav.autopilot.vehicle_type import Autopilot, VehicleType
+from faao_mav.autopilot.vehicle_type import VehicleType
 from faao_mav.mission.formats import MissionFile, PlanTarget
 
 
@@ -47,7 +47,7 @@ class MadeFor:
     `kind` is a type of vehicle, or the MAV_TYPE of one that is not known here in words.
     """
 
-    autopilot: Autopilot | None = None
+    autopilot: str | None = None
     kind: str | None = None
     by: str = ""
 
@@ -82,7 +82,7 @@ def addressee_mistake(made_for: MadeFor, vehicle: VehicleType) -> str | None:
     return f"the mission is for {told} ({made_for.by}), the vehicle is {autopilot} and a {kind}"
 
 
-def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
+def parameter_path(mission: Path, autopilot: str) -> Path:
     """Return the file of parameters beside `mission`.
 
     >>> parameter_path(Path("flight.plan"), "px4").name
@@ -91,7 +91,7 @@ def parameter_path(mission: Path, autopilot: Autopilot) -> Path:
     return mission.with_suffix(family(autopilot).parameter_suffix)
 
 
-def autopilot_of(parameters: Iterable[str]) -> Autopilot | None:
+def autopilot_of(parameters: Iterable[str]) -> str | None:
     """Return whose names `parameters` are, None where they do not tell."""
     names = tuple(parameters)
     found = [

@@ -15,9 +15,7 @@ from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.model import Model
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.vehicle_type import (
-    Autopilot,
     AutopilotFamily,
-    Kind,
     VehicleType,
     lean_acceleration,
 )
@@ -235,7 +233,7 @@ def vehicle_type(autopilot: str, kind: str) -> VehicleType:
         raise InputError(f"vehicle: {autopilot} {kind} is unknown; known are {known}") from None
 
 
-def autopilots() -> tuple[Autopilot, ...]:
+def autopilots() -> tuple[str, ...]:
     """Return the names that `vehicle.autopilot` of a plan may have.
 
     >>> autopilots()
@@ -244,7 +242,7 @@ def autopilots() -> tuple[Autopilot, ...]:
     return tuple(each.key for each in families())
 
 
-def kinds() -> tuple[Kind, ...]:
+def kinds() -> tuple[str, ...]:
     """Return the names that `vehicle.type` of a plan may have.
 
     >>> kinds()

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Literal
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body
@@ -15,12 +15,6 @@ from faao_mav.autopilot.orbit import Orbits, RallyRule
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
-
-Autopilot: TypeAlias = str
-"""The name of an autopilot, as `vehicle.autopilot` of a plan has it."""
-
-Kind: TypeAlias = str
-"""The name of a type of vehicle, as `vehicle.type` of a plan has it."""
 
 OVERSPEED = 1.1
 """The greatest speed that a mission may command, as a multiple of the plan's max_speed: it makes up
@@ -45,7 +39,7 @@ def custom_mode(mode: int) -> tuple[float, float, float]:
 class AutopilotFamily:
     """An autopilot, whatever it flies."""
 
-    key: Autopilot  # Its name in plans and options
+    key: str  # Its name in plans and options
     name: str  # The name that is shown
     mav_autopilot: int  # Its MAV_AUTOPILOT number on the wire and in `.plan` files
     parameter_suffix: str  # What its parameter files end in
@@ -90,7 +84,7 @@ class VehicleType:
     """One autopilot flying one type of vehicle: what is true of all of them."""
 
     family: AutopilotFamily  # The autopilot
-    kind: Kind  # The type of vehicle as plans and options name it
+    kind: str  # The type of vehicle as plans and options name it
     name: str  # The name that is shown, as "ArduCopter"
     # Its MAV_TYPE numbers; the first is written into `.plan` files and heartbeats
     mav_types: tuple[int, ...]

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from faao_mav.autopilot import Autopilot, Kind, Vehicle, autopilots, family, kinds
+from faao_mav.autopilot import Vehicle, autopilots, family, kinds
 from faao_mav.autopilot.files import MadeFor, autopilot_of, made_for, parameter_path
 from faao_mav.errors import InputError
 from faao_mav.mission.formats.parameter_file import read_parameters
@@ -17,7 +17,7 @@ def choose_vehicle(
     mission_file: Path,
     file: "MissionFile",
     plan: "Plan | None",
-    asked: tuple[Autopilot | None, Kind | None, Path | None],
+    asked: tuple[str | None, str | None, Path | None],
 ) -> tuple[Vehicle, str]:
     """Return the vehicle, and what told which.
 

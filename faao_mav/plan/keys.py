@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from faao_mav.autopilot import Autopilot, Kind, autopilots, kinds
+from faao_mav.autopilot import autopilots, kinds
 from faao_mav.plan.fields import Written, listed
 from faao_mav.plan.model import PlanFile
 
@@ -55,7 +55,7 @@ def reference() -> Mapping[str, PlanKey]:
 
 
 @cache
-def _reference(names: tuple[Autopilot, ...], kinds: tuple[Kind, ...]) -> Mapping[str, PlanKey]:
+def _reference(names: tuple[str, ...], kinds: tuple[str, ...]) -> Mapping[str, PlanKey]:
     """Return the keys where vehicles of these `names` and `kinds` are known."""
     del names, kinds
     return {key.path: key for key in _below(PlanFile, "")}

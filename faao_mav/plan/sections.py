@@ -15,7 +15,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from faao_mav.autopilot import Autopilot, Kind, autopilots, kinds, vehicle_type
+from faao_mav.autopilot import autopilots, kinds, vehicle_type
 from faao_mav.autopilot.body import Body, CopterBody, PlaneBody
 from faao_mav.errors import InputError
 from faao_mav.plan.energy import Battery, PowerOptions
@@ -97,10 +97,8 @@ class Site:
     wind: Wind = Wind(speed=0.0, from_degrees=0.0)
 
 
-AutopilotName: TypeAlias = Annotated[
-    Autopilot, one_of(autopilots), Written(lambda: listed(autopilots()))
-]
-KindName: TypeAlias = Annotated[Kind, one_of(kinds), Written(lambda: listed(kinds()))]
+AutopilotName: TypeAlias = Annotated[str, one_of(autopilots), Written(lambda: listed(autopilots()))]
+KindName: TypeAlias = Annotated[str, one_of(kinds), Written(lambda: listed(kinds()))]
 
 
 def _body_of(value: object, info: ValidationInfo) -> Body | None:
