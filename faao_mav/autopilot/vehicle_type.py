@@ -52,14 +52,17 @@ class AutopilotFamily:
     # The first three parameters of DO_SET_MODE for one of its custom modes
     mode_parameters: Callable[[int], tuple[float, float, float]] = custom_mode
     setpoints: SetpointRules = field(default_factory=SetpointRules)  # How it is flown by setpoints
-    # The frame in which it takes them, about its origin in degrees
-    local_frame: Callable[[float, float], LocalFrame] = LocalFrame
+    earth_radius: float | None = None  # Of the sphere of its local frame, m; None: WGS84
     # Whole numbers among its parameters are sent as their 32 bits, and only what is sent with the
     # right type is set
     whole_as_bits: bool = False
     mavlink_2: str = ""  # The parameter and its value with which a port speaks MAVLink 2
     # What may be why it does not answer, and what to do; "": nothing is known
     only_one_station: str = ""
+
+    def local_frame(self, latitude: float, longitude: float) -> LocalFrame:
+        """Return the frame in which it takes setpoints, about its origin in degrees."""
+        return LocalFrame(latitude, longitude, self.earth_radius)
 
 
 @dataclass(frozen=True, slots=True)

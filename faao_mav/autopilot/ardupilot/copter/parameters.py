@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Self
 
-from faao_mav.autopilot.ardupilot import SHARED, FlatFrame
+from faao_mav.autopilot.ardupilot import ARDUPILOT, SHARED
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, row, rule, table
@@ -99,5 +99,5 @@ TABLE = table(
 def _metres(latitude: float) -> tuple[float, float]:
     """The autopilot's metres per metre of WGS84 at `latitude` degrees, east and north."""
     there = LocalFrame(latitude, 0.0).to_geodetic([1.0, 1.0])
-    east, north = FlatFrame(latitude, 0.0).to_local(*there).tolist()
+    east, north = ARDUPILOT.local_frame(latitude, 0.0).to_local(*there).tolist()
     return east, north
