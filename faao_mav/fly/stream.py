@@ -221,6 +221,8 @@ class Stream(Watch):
         if self.phase == "flying" and over:
             self.phase, self._path = "ending", (self._flown, self._finish)
             out += self._set_mode(now, self._finish)
+        if self.phase == "engaging":
+            out += self._repeat(now)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent, self._sent_by = t, now + PATIENCE
             self._first_sent = min(self._first_sent, t)
