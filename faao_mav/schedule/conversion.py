@@ -17,13 +17,12 @@ from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.initial_route import initial_route, slowest_leg
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
+from faao_mav.schedule.route import DIGITS
 from faao_mav.schedule.schedule import Schedule
-from faao_mav.schedule.scheduler import GOOD_COST, Scheduler
+from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
 from faao_mav.schedule.transit import check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 
-_PLANE_SHARE = 0.8  # of the path tolerance for the initial route of a plane, which is then split
-_DECIMALS = 3  # of the positions in m: the last digits are another processor's
 _ROUNDING = 0.02  # m beside the fence that rounding takes: places are sent in 1e-7 degrees, 11 mm
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
 
@@ -153,9 +152,8 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
 
     Raises `InputError` for unusable parameters, `InfeasibleError` for too many items.
     """
-    t, w = solution.t, np.round(solution.w, _DECIMALS)
-    hovers = plan.aircraft.type.hovers
-    route = initial_route(t, w, plan, share=1.0 if hovers else _PLANE_SHARE)
+    t, w = solution.t, np.round(solution.w, DIGITS)
+    route = initial_route(t, w, plan)
     sets = plan.candidates
     schedulers = [_scheduler(plan, t, w, _with(plan.aircraft, each)) for each in sets]
     firsts = [scheduler.first(route) for scheduler in schedulers]
@@ -166,7 +164,7 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
         new = _outside(tried, plan.keep_in), tried.cost  # inside the fence first
         if new < rank:
             chosen, best, rank = k, tried, new
-        if rank <= (0.0, GOOD_COST):
+        if rank <= (0.0, ALLOWED_ERROR):
             break
     return Conversion(
         mission=assemble(best.route, plan),

@@ -24,10 +24,6 @@ _FIRST_WAIT = 6.0
 
 _LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
 
-# The most waypoints to which splitting legs leads; the path itself may take more. Chosen: with 24
-# for good schedules, a mean of 2 items less, and up to twice the error.
-_MOST_WAYPOINTS = 40
-
 _ROUNDS = 5  # the most rounds of splitting legs
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
 _LEAST = 1e-9  # the least duration, s, and length, m, of a leg: there is no speed without them
@@ -78,19 +74,15 @@ class CopterScheduler(Scheduler):
         """Return the plan's times (k,), s, at which legs that are too far off are best split."""
         route = schedule.route
         off = lengths(schedule.positions(self.t) - self.w)
-        splits = []
+        times = []
         for k in range(route.first, route.last):
             inside = np.flatnonzero(
                 (self.t > route.departures[k]) & (self.t < route.arrivals[k + 1])
             )
             usable = inside[self._long_enough(route, k, inside)]
             if len(usable) and off[inside].max() > ALLOWED_ERROR:
-                at = usable[np.argmax(off[usable])]
-                splits.append((float(off[inside].max()), float(self.t[at])))
-        splits.sort(reverse=True)
-        return np.sort(
-            [time for _, time in splits[: max(0, _MOST_WAYPOINTS - len(route.positions))]]
-        )
+                times.append(float(self.t[usable[np.argmax(off[usable])]]))
+        return np.array(times)
 
     def _long_enough(self, route: Route, k: int, inside: Integers) -> Flags:
         """Tell for each sample `inside` leg k whether both parts are long enough for their speed.

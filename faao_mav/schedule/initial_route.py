@@ -18,10 +18,10 @@ from faao_mav.vector import lengths
 _MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 
 
-def initial_route(t: Real, w: Real, plan: Plan, *, share: float = 1.0) -> Route:
+def initial_route(t: Real, w: Real, plan: Plan) -> Route:
     """Return waypoints, waits and speeds that follow the trajectory.
 
-    The polyline through the waypoints passes every sample of `w` within `share` of
+    The polyline through the waypoints passes every sample of `w` within
     `plan.mission.path_tolerance`. Hovers are one waypoint with a wait of whole seconds; what
     rounding leaves over is carried to the next wait. Each leg's speed is its length over its
     planned duration, to 0.001 m/s, at most `plan.max_ground_speed`: the time that it takes to
@@ -30,7 +30,7 @@ def initial_route(t: Real, w: Real, plan: Plan, *, share: float = 1.0) -> Route:
     `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
     positions at those times, metres.
     """
-    slowest, tolerance = slowest_leg(plan), share * plan.mission.path_tolerance
+    slowest, tolerance = slowest_leg(plan), plan.mission.path_tolerance
     fixed = hovers_and_ends(t, w, tolerance, slowest)
     waypoints = [fixed[0]]
     for start, stop in pairwise(fixed):

@@ -1,8 +1,8 @@
 """Missions for aeroplanes: waypoints that keep the plan's path, then speeds that keep its time.
 
 An aeroplane aims at a point far ahead on its track: it cuts into bends and swings out of them. So
-its waypoints are moved against its predicted offsets from the plan, again and again, with more of
-them where that is not enough; then the speeds are fitted. Waypoints are judged by the path alone:
+its waypoints are moved against its predicted offsets from the plan, again and again; then the
+speeds are fitted. Waypoints are judged by the path alone:
 the speeds mend the time. The aircraft cannot wait, and it is slow to change its speed: a change
 begins legs before the plan's, and time that is lost it cannot always make up for.
 """
@@ -13,9 +13,9 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Schedule, positions_at
+from faao_mav.schedule.schedule import PASSING_WINDOW, Schedule, positions_at
 from faao_mav.schedule.scheduler import Scheduler
-from faao_mav.vector import distances_to_path, lengths
+from faao_mav.vector import lengths
 
 _MOVES = 12  # times that the waypoints are moved; twice as many bring a tenth at most
 
@@ -23,10 +23,6 @@ _MOVES = 12  # times that the waypoints are moved; twice as many bring a tenth a
 # neighbouring waypoints correct the same offset and overdo it.
 _MOVE_SHARE = 0.5
 
-_PASSING_WINDOW = 6.0  # s before and after a waypoint counts as reached, in which it is passed
-
-_SPLITS = 2  # times that legs are split off which the flight strays too far; chosen
-_STRAY = 0.5  # the share of the path tolerance beyond which a leg is split; chosen
 _ROUNDS = 3  # times that waypoints are moved and speeds fitted, in turn; chosen
 # Where the plan's speed changes by more than this share, its legs are split so often, s; chosen.
 _CHANGE, _CHANGE_SPACING = 0.05, 5.0
@@ -47,15 +43,7 @@ class PlaneScheduler(Scheduler):
         ways = np.diff(route.positions, axis=0)
         ground = ways * (route.speeds / lengths(ways))[:, None]
         speeds = np.clip(lengths(ground - self.wind) / ratio, self.min_speed, self.max_speed)
-        best = self._kept(replace(route, speeds=speeds))
-        for _ in range(_SPLITS):
-            if best.deviation.path <= self.tolerance:
-                break
-            split = self._kept(self._split(best))
-            if split.deviation.path >= best.deviation.path:
-                break
-            best = split
-        return best
+        return self._kept(replace(route, speeds=speeds))
 
     def _kept(self, route: Route) -> Schedule:
         """Return the flight of `route` with its waypoints moved to keep the path best."""
@@ -70,7 +58,7 @@ class PlaneScheduler(Scheduler):
         """Return the route with its waypoints moved against the flight's offsets, by `_MOVE_SHARE`.
 
         An offset is that from the plan's position when it passes the waypoint to the nearest
-        position of the flight within 6 s of when the waypoint counts as reached, for the flight may
+        position of the flight within 3 s of when the waypoint counts as reached, for the flight may
         pass it again.
         """
         route, flown = schedule.route, schedule.flown
@@ -78,23 +66,11 @@ class PlaneScheduler(Scheduler):
         planned = positions_at(route.arrivals, self.t, self.w)
         for k in range(route.first + 1, route.last + 1):
             about = flown.arrivals[k]
-            window = [about - _PASSING_WINDOW, about + _PASSING_WINDOW]
+            window = [about - PASSING_WINDOW, about + PASSING_WINDOW]
             first, last = np.searchsorted(flown.t, window)
             near = flown.position[first:last, :2]
             positions[k] -= _MOVE_SHARE * (near[np.argmin(lengths(near - planned[k]))] - planned[k])
         return replace(route, positions=positions)
-
-    def _split(self, schedule: Schedule) -> Route:
-        """Return the route with a waypoint more on each leg where the flight strays too far."""
-        route = schedule.route
-        stray = distances_to_path(self.w, schedule.flown.position[:, :2])
-        times: list[float] = []
-        for k in range(route.first, route.last):
-            begin, end = route.arrivals[k] + _SHORTEST_TIME, route.arrivals[k + 1] - _SHORTEST_TIME
-            inside = np.flatnonzero((self.t > begin) & (self.t < end))
-            if len(inside) and stray[inside].max() > _STRAY * self.tolerance:
-                times.append(float(self.t[inside[np.argmax(stray[inside])]]))
-        return self.with_waypoints(route, np.array(times))
 
     def _changes(self, route: Route) -> Real:
         """Return times, s, at which legs are split so that changes of speed can begin there.

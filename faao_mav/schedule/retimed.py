@@ -21,13 +21,8 @@ from faao_mav.vector import lengths
 
 _STRIDE = 3  # of so many samples of a predicted flight, 0.1 s apart, one is kept, for speed
 
-# The flown speed over the commanded one from which a flight heeds the command, and from which it is
-# all the command's. Of 326 fits the most ended best so, of four such pairs.
-_HEEDING, _COMMANDED = 0.75, 0.95
-
 _REACHED = 1.03  # the largest ratio of a command and the speed flown for which it counts as reached
 _LEAST_PEAK = 0.1  # the least speed, m/s, that a leg is taken to reach
-_RESTLESS = 0.02  # the share with which every instant of a leg counts, on the command or not
 
 # How far speeds are moved to see what they do, m/s: beyond the kinks of what legs come to. With
 # 0.15 to 0.4 schedules of 105 plans for ArduCopter are as good; with 0.01 fits end at kinks.
@@ -85,13 +80,10 @@ class Retimed:
         self._peaks = np.where(tops > _REACHED * peaks, peaks, np.inf)
         self.limits = self._peaks if known is None else np.minimum(self._peaks, known.most)
         self._speeds = np.minimum(tops, self._peaks)
-        share = (speed / self._speeds[leg] - _HEEDING) / (_COMMANDED - _HEEDING)
-        lasting = np.diff(self._t) * under_way[:-1]
+        share = np.clip(speed / self._speeds[leg], 1e-9, 1.0) * under_way
         steps = np.zeros((len(self._t), len(peaks)))
-        at = np.arange(1, len(leg)), leg[:-1]
-        steps[at] = np.clip(share[:-1], 0.0, 1.0) * lasting
+        steps[np.arange(1, len(leg)), leg[:-1]] = share[:-1] * np.diff(self._t)
         self._cruise = steps.sum(axis=0)
-        steps[at] += _RESTLESS * lasting
         done = np.cumsum(steps, axis=0)
         self._done = done / np.maximum(done[-1], 1e-9)
         self._told = self._durations(route.speeds)

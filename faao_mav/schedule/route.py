@@ -10,13 +10,11 @@ from faao_mav.autopilot import FlightPath
 from faao_mav.plan import Vector
 from faao_mav.vector import lengths
 
-_SPEED_DIGITS = 3  # decimals of a commanded speed in m/s: with two, 300 s of flight end 0.25 s off
+DIGITS = 3
+"""Decimals of all values of a route, in m, m/s and s, as they are flown and sent.
 
-
-_DIGITS = 4
-"""Decimals of all values of a route, in m, m/s and s, whose flight is predicted.
-
-Chosen: far above the noise of rounding (1e-9 and less), far below what a flight shows.
+Far above the noise of a processor's rounding (1e-9 and less), far below what a flight shows; with
+speeds of two, 300 s of flight end 0.25 s off.
 """
 
 
@@ -69,12 +67,12 @@ class Route:
         return np.concatenate([[0.0], turns, [0.0]])[: len(self.positions)]
 
     def rounded(self) -> "Route":
-        """Return the route to 0.1 mm, 0.1 mm/s and 0.1 ms.
+        """Return the route to 1 mm, 1 mm/s and 1 ms.
 
         What is chosen from predicted flights then does not hang on how a processor rounds.
         """
         values = {name: getattr(self, name) for name in ("positions", "speeds", "waits", "lead")}
-        return replace(self, **{name: np.round(x, _DIGITS) for name, x in values.items()})
+        return replace(self, **{name: np.round(x, DIGITS) for name, x in values.items()})
 
     def holds_and_delays(self, *, whole_seconds: bool) -> tuple[Real, Real]:
         """Return `waits` as holds, which waypoints command, and delays of items after them.
@@ -135,6 +133,6 @@ def sent_speeds(speeds: Real, max_speed: float) -> Real:
     >>> sent_speeds(np.array([4.00049, 7.9999]), 7.9999)
     array([4.   , 7.999])
     """
-    scale = 10**_SPEED_DIGITS
+    scale = 10**DIGITS
     limit = np.floor(max_speed * scale + 1e-6) / scale or max_speed
-    return np.minimum(np.round(speeds, _SPEED_DIGITS), limit)
+    return np.minimum(np.round(speeds, DIGITS), limit)

@@ -15,17 +15,13 @@ from faao_mav.vector import distances_to_path, lengths
 # 1.44, 1.57 and 1.59 m rms.
 LATE_WEIGHT = 5.0
 
-# Metres of position error that one metre of path error costs beyond a share of the path tolerance.
-# Raised from 5, with which not every plan of benchmarks/missions.py kept its tolerance.
-_PATH_WEIGHT, _PATH_SHARE = 8.0, 0.95
-
-# Of so many samples of the flown path, 0.1 s apart, one is compared, for speed: at 5 m/s², an arc
-# that takes 0.4 s strays 0.1 m from its chord.
-_PATH_STRIDE = 4
+# Metres of position error that one metre of path error beyond the path tolerance costs. Raised from
+# 5, with which not every plan of benchmarks/missions.py kept its tolerance.
+_PATH_WEIGHT = 8.0
 
 # Seconds before and after a waypoint counts as reached, in which it is passed. Chosen: longer than
 # crossing an acceptance radius takes, shorter than coming back.
-_PASSING_WINDOW = 3.0
+PASSING_WINDOW = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +96,7 @@ class Schedule:
     def deviation(self) -> Deviation:
         """How far the predicted flight is from the plan."""
         t, w = self.flown.t - self.start, self.flown.position[:, :2]
-        return deviation(self.t, self.w, t, w, self.tolerance, stride=_PATH_STRIDE)
+        return deviation(self.t, self.w, t, w, self.tolerance)
 
     @property
     def error(self) -> float:
@@ -109,24 +105,21 @@ class Schedule:
 
     @property
     def cost(self) -> float:
-        """What the schedulers minimise, m: `error` and the weighted path error beyond its share."""
-        beyond = self.deviation.path - _PATH_SHARE * self.tolerance
-        return self.error + _PATH_WEIGHT * max(0.0, beyond)
+        """What the schedulers minimise, m: `error`, and what the path errs beyond its tolerance."""
+        return self.error + _PATH_WEIGHT * max(0.0, self.deviation.path - self.tolerance)
 
 
-def deviation(
-    planned_t: Real, planned_w: Real, t: Real, w: Real, tolerance: float, *, stride: int = 1
-) -> Deviation:
+def deviation(planned_t: Real, planned_w: Real, t: Real, w: Real, tolerance: float) -> Deviation:
     """Compare a flight at `w` (k, 2), m, with the plan at `planned_w` (n, 2), m.
 
     `t` (k,) and `planned_t` (n,), s, are on the plan's clock. The flight is over within `tolerance`
-    m of the plan's last position; until then its path counts, every `stride`th sample of it.
+    m of the plan's last position; until then its path counts.
     """
     at = positions_at(planned_t, t, w)
     apart = lengths(at - planned_w)
     late = lateness(planned_t, planned_w, t, w, tolerance)
     begin, end = planned_t[0], planned_t[-1] + late  # a path flown late or early is the same path
-    inside = t[(t > begin) & (t < end)][::stride]
+    inside = t[(t > begin) & (t < end)]
     path = positions_at(np.concatenate([[begin], inside, [end]]), t, w)
     return Deviation(
         rms=float(np.sqrt(np.mean(apart**2))),
@@ -178,7 +171,7 @@ def passing(t: Real, w: Real, place: Real, about: float) -> float:
     That is within 3 s of `about`, s: an autopilot counts a waypoint as reached within a radius of
     it, before or after it is closest.
     """
-    first, last = np.searchsorted(t, [about - _PASSING_WINDOW, about + _PASSING_WINDOW])
+    first, last = np.searchsorted(t, [about - PASSING_WINDOW, about + PASSING_WINDOW])
     t, w = t[first:last], w[first:last]
     steps = np.diff(w, axis=0)
     along = np.sum((place - w[:-1]) * steps, axis=1)

@@ -23,15 +23,11 @@ from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Unknowns, stepped
 ALLOWED_ERROR = 0.8
 
 WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
-GOOD_COST = 1.5  # the cost of a schedule, m, from which nothing costlier is tried to better it
 
 _MOST_FLIGHTS = 5  # of a fit
 _LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
-_FITTED = 0.4  # the root of the sum of squares, m, that is left as it is
 
-_ALIKE = (0.1, 0.03)  # relative differences of neighbours' speeds that are tried as one, in turn
-_SHARED_COST = 1.05  # the largest ratio of the costs with and without shared speeds to accept
-_WAIT_DIGITS = 2  # decimals of a commanded wait, s: one makes 8 of 77 schedules a third worse
+_ALIKE = 0.1  # the relative difference of neighbours' speeds that are tried as one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +94,7 @@ class Scheduler(ABC):
             if now >= before:
                 break
             x, best, cost = tried, flown, now
-            if now > (1 - _LEAST_GAIN) * before or now < _FITTED**2:
+            if now > (1 - _LEAST_GAIN) * before:
                 break
         return best
 
@@ -115,25 +111,23 @@ class Scheduler(ABC):
 
     def shared(self, schedule: Schedule, top_speed: float) -> Schedule:
         """Return `schedule` with one speed for neighbouring legs wherever that hardly costs."""
-        for alike in _ALIKE:
-            groups = _speed_groups(schedule.route.speeds, alike)
-            if len(groups) == 0 or groups[-1] == len(groups) - 1:
-                continue
-            with_fewer = self.fitted(schedule.route, top_speed, groups=groups)
-            if with_fewer.cost <= max(_SHARED_COST * schedule.cost, ALLOWED_ERROR / 2):
-                return with_fewer
-        return schedule
+        groups = _speed_groups(schedule.route.speeds)
+        if len(groups) == 0 or groups[-1] == len(groups) - 1:
+            return schedule
+        shared = self.fitted(schedule.route, top_speed, groups=groups)
+        most = max(schedule.cost / WORTHWHILE, ALLOWED_ERROR / 2)
+        return shared if shared.cost <= most else schedule
 
     def rounded(self, schedule: Schedule, top_speed: float) -> Schedule:
         """Return `schedule` with the values that are sent, and a last wait to the plan's end."""
         route = schedule.route
-        lead, waits = round(route.lead, _WAIT_DIGITS), np.round(route.waits, _WAIT_DIGITS)
+        waits = route.waits.copy()
         if route.last == len(waits) - 1:  # it ends at rest, and the plan with its last slot
             end = 2 * self.t[-1] - self.t[-2]
             early = end + schedule.start - schedule.flown.arrivals[-1]
             waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
         speeds = sent_speeds(route.speeds, top_speed)
-        return self.flight(replace(route, speeds=speeds, waits=waits, lead=lead))
+        return self.flight(replace(route, speeds=speeds, waits=waits))
 
     def _with_radii(self, route: Route) -> Route:
         """Return `route` with the acceptance radii that suit its legs and turns."""
@@ -146,11 +140,11 @@ class Scheduler(ABC):
         return replace(route, radii=np.round(radii, 1))
 
 
-def _speed_groups(speeds: Real, alike: float) -> Integers:
-    """Number the runs of legs whose speeds stay within a factor 1 + `alike` of their first."""
+def _speed_groups(speeds: Real) -> Integers:
+    """Number the runs of legs whose speeds stay within a factor 1 + `_ALIKE` of their first."""
     groups, leader = np.zeros(len(speeds), dtype=int), 0
     for k in range(1, len(speeds)):
-        same = abs(speeds[k] - speeds[leader]) <= alike * speeds[leader]
+        same = abs(speeds[k] - speeds[leader]) <= _ALIKE * speeds[leader]
         groups[k] = groups[k - 1] + (not same)
         leader = leader if same else k
     return groups

@@ -24,8 +24,6 @@ SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autop
 _SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
 _STEPS = 8  # the most steps with one flight retimed
 _SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
-_MOST_LATE = 5.0  # the lateness, s, beyond which more of it costs no more
-_CRAWL = 0.5  # the least speed, m/s, to which a leg is slowed that is planned to be faster
 
 
 class Unknowns:
@@ -44,9 +42,8 @@ class Unknowns:
         self._route, self._groups, self._free = route, groups, free
         means = np.bincount(groups, route.speeds) / np.bincount(groups)
         self._speeds, waits = len(means), int(free.sum())
-        slowest = np.maximum(min_speed, np.minimum(_CRAWL, means))
         most_lead = MOST_LEAD if route.first == 0 else 0.0
-        fastest = np.full(len(means), max_speed)
+        slowest, fastest = np.full((2, len(means)), [[min_speed], [max_speed]])
         self.low = np.concatenate([slowest, np.full(waits, SHORTEST_HOLD), [0.0]])
         self.high = np.concatenate([fastest, np.full(waits, np.inf), [most_lead]])
         begin = np.concatenate([means, route.waits[free], [route.lead]])
@@ -90,7 +87,7 @@ class Goal:
 
     def _residuals(self, positions: Real, late: float) -> Real:
         apart = (positions - self._w) * self._weight
-        return np.append(apart.T, LATE_WEIGHT * min(max(late, -_MOST_LATE), _MOST_LATE))
+        return np.append(apart.T, LATE_WEIGHT * late)
 
     def slopes(self, found: Retiming, later: Real) -> Real:
         """Return what the unknowns do to the residuals, (r, k).
@@ -100,8 +97,7 @@ class Goal:
         """
         velocities = found.velocities * self._weight
         apart = -(velocities.T[:, :, None] * later[:-1]).reshape(-1, later.shape[1])
-        late = later[-1:] * (LATE_WEIGHT * (abs(found.late) < _MOST_LATE))
-        slopes: Real = np.vstack([apart, late])
+        slopes: Real = np.vstack([apart, LATE_WEIGHT * later[-1:]])
         return slopes
 
 

@@ -12,9 +12,8 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.vector import distances_to_segment, lengths
 
-# Shares of the path tolerance that together never exceed it: how far a sample may be from its leg,
-# a hover's radius, and how far apart two hovers may be that become one.
-LEG_SHARE, _HOVER_SHARE, _MERGE_SHARE = 0.9, 0.9, 0.05
+# The share of the path tolerance by which a sample may be from its leg, and from its hover.
+LEG_SHARE = 0.9
 
 SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower trajectory hovers
 
@@ -92,12 +91,13 @@ def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[
     """Return the waypoints between which a trajectory moves: w_I, the hovers, w_F.
 
     `t` (n,) s, `w` (n, 2) m; `tolerance` is the path tolerance, m; slower than `slowest` m/s it may
-    hover. A hover at an end takes the end's exact position. Neighbours in one place with nothing of
-    note between them are one.
+    hover. A hover at an end takes the end's exact position; a flight that stays is one.
     """
     end = len(t) - 1
     closed = math.dist(w[0], w[end]) <= _SAME_POINT
-    radius = _HOVER_SHARE * tolerance
+    radius = LEG_SHARE * tolerance
+    if closed and lengths(w - w[0]).max() <= tolerance:
+        return [Waypoint(0, end, w[end])]
     hovers = find_hovers(t, w, min(_WIDEST_HOVER, radius), slowest)
     if hovers and hovers[0].first == 0:
         _, last = _around(lengths(w - w[0]) <= radius, 0, 0, hovers[0].last)
@@ -112,24 +112,10 @@ def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[
     else:
         hovers.append(Waypoint(end, end, w[end]))
 
-    merged = [hovers[0]]
-    for hover in hovers[1:]:
-        before = merged[-1]
-        ends = hover.last == end
-        near = _SAME_POINT if before.first == 0 and ends else _MERGE_SHARE * tolerance
-        position = hover.position if ends else before.position
-        samples = w[before.first : hover.last + 1]
-        if (
-            math.dist(before.position, hover.position) <= near
-            and lengths(samples - position).max() <= tolerance
-        ):
-            merged[-1] = Waypoint(before.first, hover.last, position)
-        else:
-            merged.append(hover)
-    for k in range(1, len(merged) - 1):
-        begin, end = merged[k - 1].last + 1, merged[k + 1].first - 1
-        merged[k] = _with_swings(w, merged[k], begin, end, radius)
-    return merged
+    for k in range(1, len(hovers) - 1):
+        begin, end = hovers[k - 1].last + 1, hovers[k + 1].first - 1
+        hovers[k] = _with_swings(w, hovers[k], begin, end, radius)
+    return hovers
 
 
 def simplify(w: Real, tolerance: float) -> list[int]:

@@ -17,11 +17,9 @@ from relay_flights import (
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.predict import predict
-from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.schedule import Conversion
-from faao_mav.schedule.conversion import check_vehicle
 
 STEP = 0.2
 
@@ -70,13 +68,23 @@ def test_arducopter_keeps_the_plan_in_space_and_time(
     flight: Callable[[], Trajectory], recommend: bool
 ) -> None:
     t, w = flight()
-    plan = plan_with(recommend=recommend)
+    own = {"WPNAV_ACCEL": 120.0, "RTL_ALT": 4000.0}
+    plan = plan_with(recommend=recommend, parameters=own if recommend else {})
     conversion = converted(t, w, plan)
     found = conversion.schedule.deviation
     assert found.rms < (1 if recommend else 3)
     assert found.path < plan.mission.path_tolerance
     assert nearly_there(conversion, w) == pytest.approx(0, abs=0.5)
-    assert len(conversion.mission.items) < 70
+    assert len(conversion.mission.items) < 75
+    told = conversion.parameters
+    assert conversion.vehicle.parameters == {**plan.vehicle.parameters, **told}
+    if recommend:  # by the names of both generations, beside the vehicle's own
+        assert (told["WPNAV_SPEED"], told["WP_SPD"], "RTL_ALT" in told) == (800, 8, False)
+        assert told["WPNAV_ACCEL"] == pytest.approx(100 * told["WP_ACC"])
+        assert told["WPNAV_JERK"] == told["WP_JERK"]
+        assert told["WP_ACC"] > 1.5  # the plan's own limit is not enough for a ramp with jerk
+    else:
+        assert not told
 
 
 def test_px4_keeps_the_plan_in_space_and_time() -> None:
@@ -90,7 +98,6 @@ def test_px4_keeps_the_plan_in_space_and_time() -> None:
     assert len(conversion.mission.items) < 60
     assert conversion.parameters["MPC_XY_CRUISE"] == 8.0
     assert not any(name.startswith("WP") for name in conversion.parameters)
-    assert not any(item.command == Command.NAV_DELAY for item in conversion.mission.items)
 
 
 @pytest.mark.parametrize("flight", [circle_at_speed, line_at_speed])
@@ -111,71 +118,19 @@ def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(
     assert route.waits[route.first] == route.waits[route.last] == 0
 
 
-def test_recommended_parameters_have_the_names_of_both_generations() -> None:
-    conversion = converted(*dash_hover_dash(), plan_with(recommend=True))
-    found = conversion.parameters
-    assert found["WPNAV_SPEED"] == 800
-    assert found["WP_SPD"] == 8
-    assert found["WPNAV_ACCEL"] == pytest.approx(100 * found["WP_ACC"])
-    assert found["WPNAV_JERK"] == found["WP_JERK"]
-    assert found["WP_ACC"] > 1.5  # the plan's own limit is not enough for a ramp with jerk
-    assert conversion.vehicle.parameters == found
-    route = conversion.schedule.route  # of a plan that speeds up from rest: without a run-in
-    assert (route.first, route.last) == (0, len(route.positions) - 1)
-    assert route.waits[0] == 6  # a hold of a second leaves the aircraft drifting
-
-
-def test_recommended_parameters_stand_beside_those_of_the_vehicle_or_are_left_out() -> None:
-    own = {"WPNAV_ACCEL": 120.0, "RTL_ALT": 4000.0}
-    for recommend in (True, False):
-        plan = plan_with(recommend=recommend, parameters=own)
-        conversion = converted(*dash_hover_dash(), plan)
-        assert "RTL_ALT" not in conversion.parameters
-        assert bool(conversion.parameters) == recommend
-        assert conversion.vehicle.parameters == {**own, **conversion.parameters}
-
-
-def test_a_vehicle_that_is_slow_to_speed_up_is_later_than_one_with_good_parameters() -> None:
-    sluggish = plan_with(parameters={"WPNAV_ACCEL": 50.0})
-    good = plan_with(recommend=True)
-    worse, better = (
-        converted(*back_and_forth(), plan).schedule.deviation.rms for plan in (sluggish, good)
-    )
-    assert worse > 1.5 * better
-
-
-def test_a_speed_that_no_mission_commands_is_refused_by_its_key() -> None:
-    plan = plan_with(recommend=True).changed({"vehicle.max_speed": 0.05, "flight.end": [0, 350]})
-    with pytest.raises(InputError, match=r"vehicle\.max_speed: 0\.05 m/s; missions command 0\.1"):
-        check_vehicle(plan)
-
-
-def test_useless_parameters_are_refused() -> None:
-    with pytest.raises(InputError, match=r"vehicle\.parameters.*WPNAV_JERK: 0"):
-        converted(*dash_hover_dash(), plan_with(parameters={"WPNAV_JERK": 0.0}))
-
-
-@pytest.mark.parametrize("flight", [dash_hover_dash, circle_at_speed])
-def test_values_are_what_is_sent(flight: Callable[[], Trajectory]) -> None:
-    plan = plan_with(recommend=True)
-    conversion = converted(*flight(), plan)
-    route = conversion.schedule.route
-    positions, speeds, waits = items_of(conversion.mission, plan)
-    assert positions == pytest.approx(route.positions, abs=1e-3)
-    assert speeds == list(route.speeds)
-    assert waits[1:] == pytest.approx((route.waits)[1:])
-    assert (route.waits == np.round(route.waits, 2)).all()
-    assert np.round(route.speeds, 3) == pytest.approx(route.speeds, abs=1e-12)
-    assert route.speeds.min() > 0
-    assert route.speeds.max() <= 1.1 * plan.vehicle.max_speed
-
-
 @pytest.mark.parametrize("flight", [dash_hover_dash, eight, circle_at_speed])
 def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) -> None:
-    """What is predicted of the items is what the schedule says of its route."""
+    """What is predicted of the items is what the schedule says of its route, as it is sent."""
     t, w = flight()
     plan = plan_with(recommend=True)
     conversion = converted(t, w, plan)
+    route, flown = conversion.schedule.route, conversion.schedule.flown
+    positions, speeds, waits = items_of(conversion.mission, plan)
+    assert positions == pytest.approx(route.positions, abs=1e-3)
+    assert speeds == list(route.speeds) == np.round(speeds, 3).tolist()
+    assert waits[1:] == pytest.approx(route.waits[1:])
+    assert (route.waits == np.round(route.waits, 3)).all()
+    assert 0 < route.speeds.min() <= route.speeds.max() <= 1.1 * plan.vehicle.max_speed
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
     whole = predict(conversion.mission, conversion.vehicle, frame)
     items = conversion.mission.items
@@ -185,7 +140,6 @@ def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) 
         if item.command == Command.NAV_WAYPOINT
     ]
     assert not any(math.isnan(whole.reached[index]) for index in waypoints)
-    route, flown = conversion.schedule.route, conversion.schedule.flown
     passed = whole.reached[waypoints]
     assert np.diff(passed[:-1]) == pytest.approx(np.diff(flown.departures[:-1]), abs=0.25)
     start = passed[route.first] - (flown.departures[route.first] - conversion.schedule.start)
@@ -194,19 +148,13 @@ def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) 
     assert apart.max() < 2.0  # 0.2 s: the mission leaves w_I from a hold, the schedule from rest
 
 
-def test_a_flight_that_stays_is_one_hold() -> None:
-    t = np.arange(0.0, 60.0, STEP)
-    conversion = converted(t, np.full((len(t), 2), 12.5), plan_with(recommend=True))
+def test_a_flight_that_stays_is_one_hold_and_two_samples_are_enough() -> None:
+    t, plan = np.arange(0.0, 60.0, STEP), plan_with(recommend=True)
+    conversion = converted(t, np.full((len(t), 2), 12.5), plan)
     assert conversion.schedule.deviation.rms == pytest.approx(0, abs=1e-9)
-    _, _, waits = items_of(conversion.mission, plan_with())
-    assert waits == [pytest.approx(60, abs=2)]
-
-
-def test_two_samples_are_enough() -> None:
+    assert items_of(conversion.mission, plan)[2] == [pytest.approx(60, abs=2)]
     for end in ([0.0, 0.0], [0.3, 0.0], [30.0, 0.0]):
-        conversion = converted(
-            np.array([0.0, 10.0]), np.array([[0.0, 0.0], end]), plan_with(recommend=True)
-        )
+        conversion = converted(np.array([0.0, 10.0]), np.array([[0.0, 0.0], end]), plan)
         assert math.isfinite(conversion.schedule.deviation.rms)
 
 

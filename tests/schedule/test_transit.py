@@ -54,43 +54,39 @@ def test_a_mission_goes_around_what_lies_between_home_and_the_route(autopilot: s
     assert 3 <= len(corners) <= 6  # the aircraft stops at each
 
 
-def test_where_the_straight_is_free_there_is_nothing_to_go_around() -> None:
+def test_a_way_that_is_not_needed_is_not_there() -> None:
     aside = plan_with(**{"fence.exclusion": [{"center": [150, 200], "radius": 20}]})
     without = parse_plan(edited(aside.text, {"fence": None}))
     route = initial_route(T, W, aside)
     assert assemble(route, aside).items == assemble(route, without).items
+    landing = plan_with(**{"mission.on_finish": "land"})
+    assert len(way_home(landing, np.array([300.0, 60.0]))) == 0
+    assert len(way_out(landing, np.array([0.0, 60.0]))) == 2
 
 
-def test_a_mission_that_does_not_return_needs_no_way_home() -> None:
-    plan = plan_with(**{"mission.on_finish": "land"})
-    assert len(way_home(plan, np.array([300.0, 60.0]))) == 0
-    assert len(way_out(plan, np.array([0.0, 60.0]))) == 2
-    last = assemble(initial_route(T, W, plan), plan).items[-2]
-    assert LocalFrame(plan.origin.latitude, plan.origin.longitude).to_local(
-        last.x, last.y
-    ) == pytest.approx([300, 60], abs=1e-3)
-
-
-def test_a_home_that_cannot_be_is_named_before_the_work() -> None:
-    with pytest.raises(
-        InputError, match=r"site\.origin: home, .* 3\.0 m inside exclusion circle.*; move it out"
-    ):
-        check_vehicle(plan_with(**{"fence.exclusion": [{"center": [5, 0], "radius": 8}]}))
-    near = {"fence.exclusion": [{"center": [10, 0], "radius": 8}]}
-    with pytest.raises(InputError, match=r"2\.0 m from exclusion circle, less than fence\.margin"):
-        check_vehicle(plan_with(**near))
-
-
-def test_a_way_that_cannot_be_is_named_before_the_work() -> None:
+def test_homes_and_ways_that_cannot_be_are_named_before_the_work() -> None:
     wall = {"polygon": [[-400, 15], [400, 15], [400, 30], [-400, 30]]}
     cell = [[-300, -100], [400, -100], [400, 300], [-300, 300]]
-    plan = plan_with(**{"fence.exclusion": [wall], "fence.inclusion": cell})
-    expected = (
-        r"no way leads from home \(site\.origin\) to flight\.start that keeps 4 m "
-        r"\(fence\.margin\).*give a smaller margin, move home"
-    )
-    with pytest.raises(InfeasibleError, match=expected):
-        check_vehicle(plan)
+    for error, told, zones in (
+        (
+            InputError,
+            r"site\.origin: home, .* 3\.0 m inside exclusion circle.*; move it out",
+            {"fence.exclusion": [{"center": [5, 0], "radius": 8}]},
+        ),
+        (
+            InputError,
+            r"2\.0 m from exclusion circle, less than fence\.margin",
+            {"fence.exclusion": [{"center": [10, 0], "radius": 8}]},
+        ),
+        (
+            InfeasibleError,
+            r"no way leads from home \(site\.origin\) to flight\.start that keeps 4 m "
+            r"\(fence\.margin\).*give a smaller margin, move home",
+            {"fence.exclusion": [wall], "fence.inclusion": cell},
+        ),
+    ):
+        with pytest.raises(error, match=told):
+            check_vehicle(plan_with(**zones))
 
 
 def test_a_run_in_has_to_be_free_as_well() -> None:

@@ -3,44 +3,47 @@
 import math
 
 import pytest
-from judged import COPTER, FRAME, PX4, given, latlon, track
+from judged import FRAME, HOME, PX4, given, latlon
 
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.item import Mission
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.straight import HOME
+from faao_mav.validate.straight import HOME as AT_HOME
 
 
-def test_heights_count_from_home_in_every_frame() -> None:
+def test_places_count_from_home_in_every_frame() -> None:
     items = "waypoint:0,9,30 waypoint:0,9,614/0 waypoint:0,9,614/5 waypoint:0,9,30/6"
     assert [place.up for place in given(items).places] == [30, 30, 30, 30]
     homeless = [place.up for place in given(f"homeless {items}").places]
     assert [math.isnan(up) for up in homeless] == [False, True, True, False]
     assert math.isnan(given("waypoint:0,9,30/10").places[0].up)
-
-
-def test_zero_zero_is_here_for_ardupilot_and_africa_for_px4() -> None:
-    case = given("waypoint:10,20,30 waypoint@0,0,15")
+    case = given("waypoint:10,20,30 waypoint@0,0,15")  # here for ArduPilot, and Africa for PX4
     here = case.places[1]
     assert [here.east, here.north, here.up] == pytest.approx([10, 20, 15], abs=1e-6)
     assert len(ValidationContext(case.mission, PX4).places) == 1
+    assert given("homeless delay=1 waypoint:5,5,9").frame == LocalFrame(*latlon(5, 5))
+    assert given("homeless delay=1").frame is None
+    assert ValidationContext(Mission((), HOME), PX4).frame == FRAME
 
 
-def test_legs_follow_items_jumps_and_the_way_home() -> None:
+def test_legs_follow_items_jumps_circles_and_the_way_home() -> None:
     legs = given("takeoff waypoint:0,100,30 waypoint:100,100,30 jump=2,1 return").legs
     assert [(leg.index, leg.start.index, leg.end.index, leg.jump) for leg in legs] == [
-        (0, HOME, 0, False),
+        (0, AT_HOME, 0, False),
         (1, 0, 1, False),
         (2, 1, 2, False),
         (3, 2, 1, True),
-        (4, 2, HOME, False),
+        (4, 2, AT_HOME, False),
     ]
     assert [round(leg.length) for leg in legs] == [0, 100, 100, 100, 141]
     assert legs[0].rise == 30
+    to, away = given("takeoff loiter_turns:0,200,30,1,0,50 waypoint:200,200,30").legs[1:]
+    assert (to.end.east, to.end.north) == pytest.approx((0, 150), abs=0.1)
+    assert (away.start.east, away.start.north) == pytest.approx((50, 200), abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
+def test_a_return_goes_where_the_vehicle_chooses() -> None:
+    for words, expected in (
         ("rally:0,250,50", (0, 250)),  # of rally points and home the nearest
         ("rally:0,250,50 rally:0,190,50", (0, 190)),
         ("rally:0,450,50", (0, 0)),
@@ -51,22 +54,13 @@ def test_legs_follow_items_jumps_and_the_way_home() -> None:
         ("px4 rally:0,250,50", (0, 250)),
         ("px4 RTL_TYPE=1 rally:0,900,50", (0, 900)),
         ("px4 RTL_TYPE=2 rally:0,250,50", (0, 0)),
-    ],
-)
-def test_a_return_goes_where_the_vehicle_chooses(words: str, expected: tuple[float, float]) -> None:
-    back = given(f"{words} takeoff waypoint:0,200,30 return").legs[-1].end
-    assert (back.east, back.north) == pytest.approx(expected, abs=0.1)
+    ):
+        back = given(f"{words} takeoff waypoint:0,200,30 return").legs[-1].end
+        assert (back.east, back.north) == pytest.approx(expected, abs=0.1)
 
 
-def test_legs_lead_to_the_edge_of_circles() -> None:
-    to, away = given("takeoff loiter_turns:0,200,30,1,0,50 waypoint:200,200,30").legs[1:]
-    assert (to.end.east, to.end.north) == pytest.approx((0, 150), abs=0.1)
-    assert (away.start.east, away.start.north) == pytest.approx((50, 200), abs=0.1)
-
-
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
+def test_speeds_hold_from_change_to_change() -> None:
+    for words, expected in (
         ("change_speed=1,8", [8, 8]),
         ("change_speed=1,8 change_speed=2,3 change_speed=1,0", [8, 8, 8, 8]),
         ("WPNAV_SPEED=700", [7]),
@@ -74,26 +68,5 @@ def test_legs_lead_to_the_edge_of_circles() -> None:
         ("WPNAV_SPEED=0", [10]),
         ("px4 change_speed=1,8 change_speed=2,3 change_speed=1,-1", [8, 3, 5, 5]),
         ("plane change_speed=0,15 change_speed=1,18 change_speed=0,-2", [15, 15, 12, 12]),
-    ],
-)
-def test_speeds_hold_from_change_to_change(words: str, expected: list[float]) -> None:
-    assert given(f"{words} waypoint:0,9,9").speeds == tuple(expected)
-
-
-def test_a_track_in_another_frame_is_the_same_track() -> None:
-    points = ((0, 0, 0), (0, 0, 30), (0, 100, 30))
-    elsewhere = LocalFrame(*latlon(300, -200))
-    moved = [(*elsewhere.to_local(*latlon(e, n)), u) for e, n, u in points]
-    here, mission = track(points, [0, 1], 5), given("takeoff return").mission
-    case = ValidationContext(mission, COPTER, here)
-    other = ValidationContext(mission, COPTER, track(moved, [0, 1], 5, frame=elsewhere))
-    assert case.track_positions is here.position
-    assert other.track_positions == pytest.approx(case.track_positions, abs=1e-3)
-
-
-def test_without_home_the_first_place_is_the_origin() -> None:
-    case = given("homeless delay=1 waypoint:5,5,9")
-    assert case.home is None
-    assert case.frame == LocalFrame(*latlon(5, 5))
-    assert given("homeless delay=1").frame is None
-    assert given("").frame == FRAME
+    ):
+        assert given(f"{words} waypoint:0,9,9").speeds == tuple(expected)
