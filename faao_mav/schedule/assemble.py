@@ -7,15 +7,11 @@ from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route
+from faao_mav.schedule.timing import SHORTEST_HOLD
 from faao_mav.schedule.transit import check_run_in, way_home, way_out
 
 _DECIMALS = 9  # of a latitude or longitude in degrees: 0.1 mm
 _PITCH = 15.0  # the least pitch of a plane's climb after take-off, degrees; chosen
-
-_STOP = 1.0  # the hold at a corner of the ways from and to home, s: the least that ArduPilot keeps
-
-# Types of DO_CHANGE_SPEED. ArduPlane takes the second for the least ground speed.
-_AIRSPEED, _GROUND_SPEED = 0.0, 1.0
 
 
 def assemble(route: Route, plan: Plan) -> Mission:
@@ -43,7 +39,8 @@ def assemble(route: Route, plan: Plan) -> Mission:
     )
 
     vehicle = plan.aircraft.type
-    axis = _GROUND_SPEED if vehicle.hovers else _AIRSPEED
+    # Types of DO_CHANGE_SPEED: 1, ground speed, is the least one to ArduPlane; 0 is airspeed.
+    axis = 1.0 if vehicle.hovers else 0.0
     items = []
     if plan.mission.takeoff:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
@@ -52,7 +49,7 @@ def assemble(route: Route, plan: Plan) -> Mission:
     fastest = min(plan.vehicle.max_speed, vehicle.fastest)
     commanded = fastest if vehicle.hovers else float(route.speeds[0])
     items.append(_change_speed(commanded, axis))
-    stop = _STOP if vehicle.hovers else 0.0
+    stop = SHORTEST_HOLD if vehicle.hovers else 0.0
     items += [_at(Command.NAV_WAYPOINT, place, altitude, stop) for place in out]
     holds, delays = route.holds_and_delays(whole_seconds=vehicle.whole_second_holds)
     for k, place in enumerate(places):

@@ -20,10 +20,9 @@ from faao_mav.schedule.plane_scheduler import PlaneScheduler
 from faao_mav.schedule.route import DIGITS
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
-from faao_mav.schedule.transit import check_transit
+from faao_mav.schedule.transit import ROUNDING, check_transit
 from faao_mav.schedule.waypoints import SLOWEST
 
-_ROUNDING = 0.02  # m beside the fence that rounding takes: places are sent in 1e-7 degrees, 11 mm
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
 
 
@@ -136,11 +135,11 @@ def convert(solution: Solution) -> Conversion:
 def _outside(schedule: Schedule, area: FreeArea | None) -> float:
     """Return how far, m, legs and predicted flight get out of the fence; 0 inside or without.
 
-    A leg that is not inside by `_ROUNDING` may be outside as sent.
+    A leg that is not inside by `ROUNDING` may be outside as sent.
     """
     if area is None:
         return 0.0
-    legs = area.clearance(schedule.route.positions) - _ROUNDING
+    legs = area.clearance(schedule.route.positions) - ROUNDING
     return max(0.0, -legs, -area.clearance(schedule.track()["predicted_w"]))
 
 

@@ -24,9 +24,7 @@ _FIRST_WAIT = 6.0
 
 _LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
 
-_ROUNDS = 5  # the most rounds of splitting legs
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
-_LEAST = 1e-9  # the least duration, s, and length, m, of a leg: there is no speed without them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,10 +48,7 @@ class CopterScheduler(Scheduler):
         if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
             top_speed *= OVERSPEED
             best = self.fitted(best.route, top_speed)
-        for _ in range(_ROUNDS):
-            times = self._split_times(best)
-            if not len(times):
-                break
+        while len(times := self._split_times(best)):
             tried = self.fitted(self._split(best.route, times), top_speed)
             if tried.cost > WORTHWHILE * best.cost:
                 break
@@ -105,6 +100,6 @@ class CopterScheduler(Scheduler):
 
 def _planned_speeds(route: Route) -> Real:
     """Return the speed with which the plan moves along each leg, (m - 1,), m/s; none is 0."""
-    planned = np.maximum(route.arrivals[1:] - route.departures[:-1], _LEAST)
-    speeds: Real = np.maximum(route.leg_lengths, _LEAST) / planned
+    durations, lengths = route.arrivals[1:] - route.departures[:-1], route.leg_lengths
+    speeds: Real = np.maximum(lengths, 1e-9) / np.maximum(durations, 1e-9)
     return speeds

@@ -10,14 +10,13 @@ from faao_mav.mission.fence_area import FreeArea
 from faao_mav.plan import Plan
 from faao_mav.schedule.route import Route
 
-_SPARE = 0.01
-"""By how much, m, a way may be nearer to the edge than the margin: a route is rounded. Chosen."""
+ROUNDING = 0.012
+"""By how much, m, a way may be nearer to the edge than it should: places are sent in 1e-7 degrees,
+11 mm."""
 
 _SIMPLER = (4.0, 1.0)
 """By how much, m, a way may keep farther from the edge than it has to, for fewer corners. Chosen:
 around a circle of 60 m they are 30 m apart."""
-
-_HOME = np.zeros(2)
 
 
 def check_transit(plan: Plan) -> None:
@@ -32,7 +31,7 @@ def check_transit(plan: Plan) -> None:
 
 def way_out(plan: Plan, first: Real) -> Real:
     """Return the corners (k, 2), m, on the way from home to `first` (2,); errors as above."""
-    return _corners(plan, _HOME, first, "home (site.origin) to flight.start")
+    return _corners(plan, np.zeros(2), first, "home (site.origin) to flight.start")
 
 
 def way_home(plan: Plan, last: Real) -> Real:
@@ -42,7 +41,7 @@ def way_home(plan: Plan, last: Real) -> Real:
     """
     if plan.mission.on_finish != "rtl":
         return np.empty((0, 2))
-    return _corners(plan, last, _HOME, "flight.end to home (site.origin)")
+    return _corners(plan, last, np.zeros(2), "flight.end to home (site.origin)")
 
 
 def way_between(plan: Plan, start: Real, end: Real) -> Real | None:
@@ -91,7 +90,7 @@ def _corners(plan: Plan, start: Real, end: Real, name: str) -> Real:
     fence, margin = plan.keep_in, _margin(plan)
     if fence is None:
         return np.empty((0, 2))
-    if not _kept(fence, margin).covers(_HOME[None]).all():
+    if not _kept(fence, margin).covers(np.zeros((1, 2))).all():
         from faao_mav.plan.fence import trouble
 
         raise InputError(
@@ -140,7 +139,7 @@ def _straightened(area: FreeArea, way: Real) -> Real:
 @lru_cache(maxsize=8)
 def _kept(fence: FreeArea, margin: float) -> FreeArea:
     """Return where a `fence` and a `margin`, m, let the aircraft be."""
-    return fence.inside(max(margin - _SPARE, 0.0))
+    return fence.inside(max(margin - ROUNDING, 0.0))
 
 
 def _margin(plan: Plan) -> float:

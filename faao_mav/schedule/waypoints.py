@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
+from faao_mav.schedule.route import DIGITS
 from faao_mav.vector import distances_to_segment, lengths
 
 # The share of the path tolerance by which a sample may be from its leg, and from its hover.
@@ -32,7 +33,6 @@ _SHIFTS = 10  # shifts of a hover towards its farthest swing, until that is at i
 _NEARLY = 1e-3  # or beyond it by this share
 
 _SPEED_WINDOW = 1.0  # s, over which a speed is averaged first: it hides a trajectory's chatter
-_SAME_POINT = 1e-3  # the distance, m, within which both ends of a trajectory are one waypoint
 _BISECTIONS = 8  # halvings of the tolerance that evens out legs: it is found to 1/256
 
 
@@ -94,7 +94,7 @@ def hovers_and_ends(t: Real, w: Real, tolerance: float, slowest: float) -> list[
     hover. A hover at an end takes the end's exact position; a flight that stays is one.
     """
     end = len(t) - 1
-    closed = math.dist(w[0], w[end]) <= _SAME_POINT
+    closed = math.dist(w[0], w[end]) <= 10**-DIGITS
     radius = LEG_SHARE * tolerance
     if closed and lengths(w - w[0]).max() <= tolerance:
         return [Waypoint(0, end, w[end])]
