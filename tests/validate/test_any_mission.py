@@ -31,28 +31,23 @@ places = st.one_of(
     st.tuples(st.floats(-90, 90), st.floats(-180, 180)),
     st.tuples(st.floats(-35.4, -35.3), st.floats(149.1, 149.2)),
 )
-homes = st.one_of(
-    st.none(),
-    st.just(HOME),
-    st.builds(Home, st.floats(-90, 90), st.floats(-180, 180), st.floats(-500, 9_000)),
-)
+points = places.map(lambda place: RallyPoint(*place, 50.0))
+homes = st.none() | st.just(HOME) | places.map(lambda place: Home(*place, -500.0))
+outlines = st.lists(places, min_size=3, max_size=6).map(tuple)
 fences = st.builds(
     Fence,
-    polygons=st.lists(
-        st.builds(Polygon, st.lists(places, min_size=3, max_size=6).map(tuple), st.booleans()),
-        max_size=3,
-    ).map(tuple),
+    polygons=st.lists(st.builds(Polygon, outlines, st.booleans()), max_size=3).map(tuple),
     circles=st.lists(
         st.builds(Circle, places, st.floats(1e-3, 1e7), st.booleans()), max_size=3
     ).map(tuple),
-    breach_return=st.one_of(st.none(), places.map(lambda place: RallyPoint(*place, 50.0))),
+    breach_return=st.none() | points,
 )
 missions = st.builds(
     Mission,
     items=st.lists(items, max_size=12).map(tuple),
     home=homes,
-    fence=st.one_of(st.just(Fence()), fences),
-    rally=st.lists(places.map(lambda place: RallyPoint(*place, 50.0)), max_size=2).map(tuple),
+    fence=st.just(Fence()) | fences,
+    rally=st.lists(points, max_size=2).map(tuple),
 )
 ZEROS = ("WPNAV_SPEED", "WPNAV_ACCEL", "WPNAV_JERK", "MPC_ACC_HOR", "MPC_JERK_AUTO", "NAV_ACC_RAD")
 STRICT = dict.fromkeys(ZEROS, 0.0) | {

@@ -17,9 +17,10 @@ from typer.testing import CliRunner
 import faao_mav
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import plan_target
+from faao_mav.cli.main import app as main
 from faao_mav.cli.missions import validate
 from faao_mav.errors import InfeasibleError
-from faao_mav.mission.formats import render_mission
+from faao_mav.mission.formats import read_mission, render_mission
 from faao_mav.mission.item import Mission
 from faao_mav.validate import RULES
 
@@ -71,6 +72,12 @@ def sound(write: Callable[..., Path]) -> Path:
 
 
 def test_nothing_wrong(run: Run, sound: Path) -> None:
+    app = typer.Typer()
+    app.command()(validate)
+    told = CliRunner().invoke(app, [str(sound), "--autopilot", "px4", "--type", "plane"]).stdout
+    assert "flight not predicted: there is no model of how PX4 flies planes" in told
+    found = faao_mav.check(read_mission(sound), Vehicle(), limits=faao_mav.Limits(max_altitude=20))
+    assert isinstance(found.findings[0], faao_mav.Finding)
     result = run(sound)
     assert result.exit_code == 0
     assert "sound.waypoints: 6 items, for ArduPilot and a copter (by default" in result.stdout
@@ -78,14 +85,8 @@ def test_nothing_wrong(run: Run, sound: Path) -> None:
     assert "0 errors, 0 warnings, 0 notes" in result.stdout
 
 
-def test_the_python_names() -> None:
-    limits = faao_mav.Limits(max_altitude=20)
-    check = faao_mav.check(given(SOUND).mission, faao_mav.Vehicle("px4"), limits=limits)
-    assert isinstance(check.findings[0], faao_mav.Finding)
-
-
 def test_errors_fail_and_say_item_rule_and_cure(run: Run, write: Callable[..., Path]) -> None:
-    broken = write(BROKEN)
+    broken, slow = write(BROKEN), write(SLOW, "slow.waypoints")
     result = run(broken)
     assert result.exit_code == 1
     assert "error: item 2: " in result.stdout
@@ -99,37 +100,27 @@ def test_errors_fail_and_say_item_rule_and_cure(run: Run, write: Callable[..., P
     assert (finding["level"], finding["rule"], finding["item"]) == ("error", "refused-on-upload", 2)
     assert finding["message"]
     assert finding["action"]
-
-
-def test_warnings_fail_only_when_strict(run: Run, write: Callable[..., Path]) -> None:
-    slow = write(SLOW)
-    assert run(slow).exit_code == 0
-    assert run(slow, "--strict").exit_code == 1
-
-
-def test_many_of_a_kind_are_one_line(run: Run, write: Callable[..., Path]) -> None:
+    assert [run(slow).exit_code, run(slow, "--strict").exit_code] == [0, 1]
     half = [f"waypoint:0,{50 * k},30,2.5" for k in (1, 2, 3, 5)]
     path = write(" ".join(["takeoff", *half[:3], "change_speed=1,5,-1", half[3]]))
-    found = [line for line in run(path).stdout.splitlines() if "[hold-changed]" in line]
-    assert len(found) == 1
-    assert "items 2-4, 6: " in found[0]
-    assert "(and 3 more like it)" in found[0]
+    (found,) = (line for line in run(path).stdout.splitlines() if "[hold-changed]" in line)
+    assert "items 2-4, 6: " in found
+    assert "(and 3 more like it)" in found
 
 
-def test_who_flies_it(run: Run, write: Callable[..., Path]) -> None:
+def test_who_flies_it(run: Run, sound: Path, write: Callable[..., Path]) -> None:
     plan = write(SOUND, "px4.plan", Vehicle("px4", "copter"))
     assert "for PX4 and a copter (as the file says)" in run(plan).stdout
     asked = run(plan, "--autopilot", "ardupilot", "--type", "plane").stdout
     assert "for ArduPilot and a plane (as asked)" in asked
     assert run(plan, "--autopilot", "betaflight").exit_code == 2
     assert run(plan, "--type", "boat").exit_code == 2
-
-
-def test_a_flight_without_a_model_is_not_predicted(sound: Path) -> None:
-    app = typer.Typer()
-    app.command()(validate)
-    told = CliRunner().invoke(app, [str(sound), "--autopilot", "px4", "--type", "plane"]).stdout
-    assert "flight not predicted: there is no model of how PX4 flies planes" in told
+    text = (MISSIONS / "copter_relay.yaml").read_text()
+    slower = sound.with_name("plan.yaml")
+    slower.write_text(text.replace("max_speed: 8", "max_speed: 7"))
+    assert slower.read_text() != text
+    assert rules(run(sound, "--plan", slower, "--json")) == {"speed-above-limit"}
+    assert "(as the plan says)" in run(sound, "--plan", slower).stdout
 
 
 def test_parameters_come_from_a_file(run: Run, sound: Path) -> None:
@@ -157,23 +148,30 @@ def test_limits(run: Run, sound: Path) -> None:
             result = run(sound, option, value)
             assert result.exit_code == 2
             assert result.stderr == f"faao-mission: {option} {value}: expected a number above 0\n"
-
-
-def test_a_plan_tells_vehicle_and_top_speed(run: Run, sound: Path) -> None:
-    text = (MISSIONS / "copter_relay.yaml").read_text()
-    plan = sound.with_name("plan.yaml")
-    plan.write_text(text.replace("max_speed: 8", "max_speed: 7"))
-    assert plan.read_text() != text
-    assert rules(run(sound, "--plan", plan, "--json")) == {"speed-above-limit"}
-    assert "(as the plan says)" in run(sound, "--plan", plan).stdout
-
-
-def test_what_cannot_be_read(run: Run, tmp_path: Path) -> None:
-    missing = run(tmp_path / "none.waypoints")
-    assert missing.exit_code == 2
+    missing = run(sound.with_name("none.waypoints"))
+    assert (missing.exit_code, missing.stdout) == (2, "")
     assert "none.waypoints" in missing.stderr
-    assert missing.stdout == ""
     assert run().exit_code == 2
+
+
+def test_a_mission_is_validated_in_a_wind(write: Callable[..., Path]) -> None:
+    path = str(write("takeoff change_speed=1,8,-1 waypoint:0,300,30 waypoint:0,0,30 land"))
+
+    def told(*options: str) -> str:
+        return CliRunner().invoke(main, ["validate", path, *options]).output
+
+    slow, quick = (
+        json.loads(told("--json", *wind))["predicted"]["duration"]
+        for wind in (("--wind", "8,180"), ())
+    )
+    assert slow > quick + 20
+    airframe = "assumes the simulator's airframe (vehicle.body: sitl)"
+    assert f"s in 8 m/s of wind; {airframe}" in told("--wind", "8,180")
+    on_px4 = told("--wind", "8,180", "--autopilot", "px4")
+    assert "s in 8 m/s of wind, as in calm air: its model leaves wind out; assumes" in on_px4
+    assert "perhaps for the wind" in told("--wind", "14,0")
+    for wind in ("8", "8,400", "fast,90", "-1,90", "nan,90", "8,90,3"):
+        assert f"--wind {wind}: expected SPEED,FROM" in told(f"--wind={wind}")
 
 
 def test_rules_are_listed(run: Run) -> None:
@@ -185,7 +183,7 @@ def test_rules_are_listed(run: Run) -> None:
     assert {"level", "summary", "source", "autopilot", "type"} <= listed[0].keys()
 
 
-def test_a_page_of_a_mission_by_itself_and_beside_its_plan(run: Run, sound: Path) -> None:
+def test_a_page_of_a_mission_by_itself(run: Run, sound: Path) -> None:
     page = sound.with_suffix(".html")
     assert run(sound, "--report", page, predicted=True).exit_code == 0
     text = page.read_text()

@@ -8,12 +8,14 @@ from conftest import SMALL, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import price_flight
 from faao_mav.schedule.schedule import positions_at
+from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import FlightRecord, Line, debriefing, plan_start, standing
 
 CHANGES = {
@@ -75,17 +77,14 @@ def test_the_departure_is_found_whatever_comes_later(
     assert plan_start(solution, line, flight) == pytest.approx(begun, abs=0.05)
 
 
-def test_a_flight_by_setpoints_is_on_the_clock_of_the_plan_and_not_of_its_mission() -> None:
+def test_flights_by_setpoints_and_what_is_not_the_flight() -> None:
+    """Setpoints are on the clock of the plan and not of its mission."""
     solution, line = solved(), Line.planned(solved())
     mission = line._replace(w=line.at(line.t - 0.4))
     for followed in (line, mission):
         t = np.arange(-5.0, 30.0, 0.2)
         flight = Line(t + 200.0, followed.at(t), t)
         assert plan_start(solution, mission, flight) == pytest.approx(200.0, abs=0.05)
-
-
-def test_what_is_not_the_flight_is_not_taken_for_it() -> None:
-    solution, line = solved(), Line.planned(solved())
     flight = flown(solution, 200.0)
     for other in (
         within(flight, 0.0, 199.0),  # on the way, and waiting at w_I
@@ -93,6 +92,20 @@ def test_what_is_not_the_flight_is_not_taken_for_it() -> None:
         within(flight, 0.0, flight.t[2]),
     ):
         assert plan_start(solution, line, other) is None
+
+
+def test_the_clock_of_a_prediction_is_that_of_its_departure() -> None:
+    """Not that of an item near w_I behind it: the flight comes by there once more on its end."""
+    solution, origin = solved(), solved().plan.origin
+    flight = flown(solution, 200.0)
+    t = np.append(flight.t, flight.t[-1] + np.arange(1.0, 60.0))
+    w = np.vstack([flight.w, np.linspace(flight.w[-1], solution.w[0], 59)])
+    n, place = len(t), np.column_stack([w, np.full(len(t), 40.0)])
+    frame = LocalFrame(origin.latitude, origin.longitude)
+    reached = np.array([200.0, 245.0, t[-1]])
+    track = Track(t, place, 0 * place, np.zeros(n, dtype=int), reached, frame)
+    found = predicted_line(solution, track)
+    assert t[0] - found.t[0] == pytest.approx(200.0, abs=0.15)
 
 
 def test_what_became_of_it_is_priced_as_a_prediction_is() -> None:
