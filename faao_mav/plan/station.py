@@ -108,12 +108,12 @@ def _track(value: object, info: ValidationInfo) -> Track | None:
         raise told(str(error)) from None
     times, *sides = held.values()
     places = []
-    for line, *place in zip(lines, *sides, strict=True):
-        written = dict(zip(_GLOBAL[1:], place, strict=True)) if "latitude" in held else place
+    for number, place in enumerate(zip(*sides, strict=True), 1):
+        written = dict(zip(_GLOBAL[1:], place, strict=True)) if "latitude" in held else [*place]
         try:
             places.append(read_position(written, info))
         except (ValueError, PydanticCustomError) as error:
-            raise told(f"line {line}: {error}") from None
+            raise told(f"point {number}: {error}") from None
     return Track(tuple(t - times[0] for t in times), tuple(places))
 
 
