@@ -3,11 +3,33 @@
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
-from faao_mav.sim import MockAutopilot
+from conftest import free_port
+
+from faao_mav.mission.item import Home
+from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.sim.serve import serve
 from faao_mav.wire.transport import Transport, open_transport
+
+HOME = Home(-35.363262, 149.165237, 584.0)
+"""Where the plans of the tests count from."""
+
+
+@contextmanager
+def vehicle(
+    kind: MockKind = "ardupilot",
+    *,
+    refusals: Any = (),
+    faults: Faults | None = None,
+    **options: Any,
+) -> Iterator[tuple[str, MockAutopilot]]:
+    """A mock at `HOME` that runs in the background, and the connection to it."""
+    behaviour, port = behaviour_of(kind, refusals=dict(refusals)), free_port()
+    mock = MockAutopilot(behaviour, **{"home": HOME, "beat": 0.1, **options})
+    with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
+        yield f"udpout:127.0.0.1:{port}", mock
 
 
 @contextmanager

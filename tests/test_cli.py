@@ -9,8 +9,6 @@ import re
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,7 @@ import pytest
 from conftest import FLYABLE, MISSIONS, edited, free_port
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from served import running
+from served import HOME, vehicle
 from typer.testing import CliRunner
 
 from faao_mav.autopilot import autopilots, kinds
@@ -27,15 +25,14 @@ from faao_mav.cli.main import app
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission, read_mission_file, write_mission
 from faao_mav.mission.formats.parameter_file import read_parameters
-from faao_mav.mission.item import Home, Mission, MissionItem
+from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.plan.yaml_text import load_yaml
-from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.sim import MockAutopilot
 from faao_mav.wire.messages import ParamRequestRead, ParamValue
 from faao_mav.wire.protocol import Address, MavResult
 from faao_mav.wire.transport import Transport
 
 DATA = Path(__file__).parent / "data"
-HOME = Home(-35.363262, 149.165237, 584.0)
 SCRIPT = Path(sys.executable).with_name("faao-mission")
 GENTLE = edited(FLYABLE, {"vehicle.max_speed": 8, "vehicle.max_acceleration": 1.5,
                           "flight.duration": 16, "name": "gentle"})  # fmt: skip
@@ -50,19 +47,6 @@ def record(*arguments: object) -> Any:
     result = run(*arguments, "--json")
     assert (result.exit_code, result.stdout.count("\n")) == (0, 1), result.output
     return json.loads(result.stdout)
-
-
-@contextmanager
-def vehicle(kind: str = "ardupilot", **options: Any) -> Iterator[tuple[str, MockAutopilot]]:
-    """A mock autopilot, and the connection to it."""
-    refusals = options.pop("refusals", {})
-    mock = MockAutopilot(
-        behaviour_of(kind, refusals=refusals),  # type: ignore[arg-type]
-        **{"home": HOME, "beat": 0.1, **options},
-    )
-    port = free_port()
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        yield f"udpout:127.0.0.1:{port}", mock
 
 
 @pytest.fixture

@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import FLYABLE, PATIENCE, free_port
+from conftest import FLYABLE, PATIENCE
 from planted import plant
-from served import running
+from served import HOME, vehicle
 from test_tiles import mbtiles
 from typer.testing import CliRunner
 
@@ -33,9 +33,8 @@ from faao_mav.errors import PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import write_mission
-from faao_mav.mission.item import Home, Mission
+from faao_mav.mission.item import Mission
 from faao_mav.plan import parse_plan, read_plan
-from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.sim.faults import Faults
 
 if TYPE_CHECKING:
@@ -50,7 +49,6 @@ PLAN = "# a comment that stays" + FLYABLE.replace("  causal: false\n", "").repla
     "duration: 10", "duration: 14"
 )
 LOGS = Path(__file__).parents[1] / "data" / "logs"
-HOME = Home(-35.363262, 149.165237, 584.0)
 PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
@@ -305,19 +303,10 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
     assert window.evaluate(CURVES)[:2] == hops
 
 
-@contextmanager
-def vehicle(**options: Any) -> Iterator[tuple[str, MockAutopilot]]:
-    """A vehicle that flies twenty times as fast as real ones, and the connection to it."""
-    mock = MockAutopilot(behaviour_of("ardupilot"), home=HOME, beat=0.1, speedup=20.0)
-    port = free_port()
-    with running(mock, f"udpin:127.0.0.1:{port}", **options):
-        yield f"udpout:127.0.0.1:{port}", mock
-
-
 def test_what_is_uploaded_and_watched_flies_by_the_command_that_is_shown(
     window: "Page", served: Served, tmp_path: Path
 ) -> None:
-    with vehicle() as (connection, mock):
+    with vehicle(speedup=20.0) as (connection, mock):
         window.get_by_role("tab", name="Fly").click()
         window.get_by_label("Connection").fill(connection)
         window.get_by_role("button", name="Upload and verify").click()

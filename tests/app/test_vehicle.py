@@ -3,17 +3,15 @@
 import asyncio
 import shlex
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import FLYABLE, free_port
+from conftest import FLYABLE
 from hypothesis import given
 from hypothesis import strategies as st
-from served import running
+from served import vehicle
 
 from faao_mav import plan_mission
 from faao_mav.app.vehicle import fly_command, uploaded, watched
@@ -21,34 +19,16 @@ from faao_mav.app.workers import talk
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.seen import Flight
-from faao_mav.mission.item import Home
 from faao_mav.plan import parse_plan
-from faao_mav.sim import MockAutopilot, behaviour_of
+from faao_mav.sim import MockAutopilot
 from faao_mav.sim.faults import Faults
 from faao_mav.workflow import Result
-
-HOME = Home(-35.363262, 149.165237, 584.0)
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
     text = FLYABLE.replace("  causal: false\n", "").replace("duration: 10", "duration: 14")
     return plan_mission(parse_plan(text, "plan.yaml"))
-
-
-@contextmanager
-def vehicle(result: Result, faults: Faults | None = None) -> Iterator[tuple[str, MockAutopilot]]:
-    port = free_port()
-    assert result.conversion is not None
-    mock = MockAutopilot(
-        behaviour_of("ardupilot"),
-        home=HOME,
-        parameters=result.conversion.parameters,
-        beat=0.1,
-        speedup=16.0,
-    )
-    with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
-        yield f"udpout:127.0.0.1:{port}", mock
 
 
 def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
@@ -79,7 +59,9 @@ def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
         assert report.ending is not None
         return report.ending.kind
 
-    with vehicle(result) as (connection, mock):
+    assert result.conversion is not None
+    timed = result.conversion.parameters
+    with vehicle(speedup=16.0, parameters=timed) as (connection, mock):
         assert asyncio.run(run(connection, mock)) == "finished"
 
 
@@ -91,7 +73,7 @@ def test_an_upload_that_is_left_is_cancelled_on_the_vehicle(result: Result) -> N
 
     slow = Faults(loss=0.2, rate=300)
     with (
-        vehicle(result, slow) as (connection, _),
+        vehicle(faults=slow) as (connection, _),
         pytest.raises(FaaoError, match=r"interrupted .*cancelled"),
     ):
         asyncio.run(run(connection))
