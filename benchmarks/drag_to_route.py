@@ -13,7 +13,6 @@ import shutil
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from faao_mav.app.document import Document
 from faao_mav.plan import parse_plan
 
 PLAN = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
-RUN = "from faao_mav.cli.main import run\nif __name__ == '__main__':\n    run()\n"
+COMMAND = Path(sys.executable).with_name("faao-mission")
 
 WATCH = """() => {
   const map = document.querySelector('.planner-map');
@@ -69,11 +68,6 @@ def computed(plan: Path, drags: int) -> list[float]:
     return times
 
 
-def told(name: str, times: list[float]) -> None:
-    """Print median and worst of `times`, ms."""
-    print(f"{name}  median {statistics.median(times):.0f} ms, worst {max(times):.0f} ms")
-
-
 def redrawn(page: Page) -> float:
     """Wait for the next route; return the milliseconds from the last mouse move to it."""
     page.wait_for_function("window.drawn", timeout=120_000)
@@ -88,31 +82,25 @@ def main() -> None:
     parser.add_argument("plan", nargs="?", type=Path, default=PLAN)
     parser.add_argument("--drags", type=int, default=50)
     asked = parser.parse_args()
-    with tempfile.TemporaryDirectory() as folder:
-        script = Path(folder) / "run.py"
-        script.write_text(RUN)
-        server = subprocess.Popen(
-            [sys.executable, script, "app", asked.plan, "--no-browser"],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        try:
-            assert server.stderr is not None
-            found = re.search(r"http://\S+", server.stderr.readline())
-            assert found is not None
-            with sync_playwright() as driver:
-                browser = driver.chromium.launch(
-                    executable_path=shutil.which("chromium"), args=["--no-sandbox"]
-                )
-                page = browser.new_page(viewport={"width": 1280, "height": 900})
-                page.goto(found[0])
-                times = measure(page, asked.drags)
-                browser.close()
-        finally:
-            server.terminate()
-            server.wait()
-    told("drag to route", times)
-    told("rough answer ", computed(asked.plan, asked.drags))
+    command = [COMMAND, "app", asked.plan, "--no-browser"]
+    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert server.stderr is not None
+        found = re.search(r"http://\S+", server.stderr.readline())
+        assert found is not None
+        with sync_playwright() as driver:
+            chromium = shutil.which("chromium")
+            browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+            page = browser.new_page(viewport={"width": 1280, "height": 900})
+            page.goto(found[0])
+            times = {"drag to route": measure(page, asked.drags)}
+            browser.close()
+    finally:
+        server.terminate()
+        server.wait()
+    times["rough answer"] = computed(asked.plan, asked.drags)
+    for name, each in times.items():
+        print(f"{name:<13}  median {statistics.median(each):.0f} ms, worst {max(each):.0f} ms")
 
 
 if __name__ == "__main__":
