@@ -155,11 +155,8 @@ def made(result: Result, wanted: str) -> tuple[str, bytes]:
         path = Path(folder) / ("mission.waypoints" if wanted.startswith(".") else wanted)
         if part:
             write_part(result, part, path)
-            return wanted, path.read_bytes()
-        mission, *beside = result.write(path)
-        if wanted.startswith("."):
-            found = [each for each in beside if wanted in each.name]
-            if not found:
-                raise PlanError(f"the mission has no {wanted.removeprefix('.')} file")
-            mission = found[0]
-        return mission.name, mission.read_bytes()
+        written = (path,) if part else result.write(path)
+        for each in written:
+            if wanted in each.name:
+                return each.name, each.read_bytes()
+    raise PlanError(f"the mission has no {wanted.removeprefix('.')} file")

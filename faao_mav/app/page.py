@@ -1,7 +1,6 @@
 """The page of one window: the map, the plan beside it, what the flight delivers, and its files."""
 
 from collections.abc import Callable
-from dataclasses import asdict
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -19,7 +18,7 @@ from faao_mav.app.guard import TILES
 from faao_mav.app.panels import Form, Results, fields
 from faao_mav.app.planner import Planner
 from faao_mav.app.scene import STATIONS, Scene
-from faao_mav.app.tiles import OPEN_STREET_MAP, Background
+from faao_mav.app.tiles import OPEN_STREET_MAP
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.plan.yaml_text import MAX_CHARACTERS
@@ -65,7 +64,7 @@ class Page:
     for answers; `_show` takes them.
     """
 
-    def __init__(self, document: Document, workers: Workers, background: Background) -> None:
+    def __init__(self, document: Document, workers: Workers, background: dict[str, Any]) -> None:
         self._document, self._workers, self._background = document, workers, background
         self._planner = Planner(workers, self._show)
         self._answer, self._gestures = Answer(), 0
@@ -252,7 +251,7 @@ class Page:
             self._chart.run_chart_method("dispatchAction", tip)
 
     def _show_background(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        self._map.run_method("background", asdict(self._background) if event.value else None)
+        self._map.run_method("background", self._background if event.value else None)
 
     def _key(self, event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):

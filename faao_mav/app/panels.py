@@ -12,28 +12,19 @@ from faao_mav.validate import Finding
 from faao_mav.validate.words import by_rule, message_of
 from faao_mav.workflow import Result
 
-_LEFT_OUT = ("study",)
-"""Sections that the page takes no notice of."""
-
-
-def _is_field(key: PlanKey, known: Mapping[str, PlanKey]) -> bool:
-    above = known.get(key.path.rpartition(".")[0])
-    in_list = above is not None and above.inside and not _is_section(above)
-    return not _is_section(key) and not in_list and key.path.split(".")[0] not in _LEFT_OUT
-
-
-def _is_section(key: PlanKey) -> bool:
-    return bool(key.inside) and key.accepted.startswith("a mapping")
-
 
 def fields() -> tuple[PlanKey, ...]:
-    """Return the keys that have a field, in the order of the plan reference.
+    """Return the keys that have a field, in the order of the plan reference: all but the study's.
 
     >>> [key.path for key in fields()][:3]
     ['name', 'site.origin.latitude', 'site.origin.longitude']
     """
-    known = reference()
-    return tuple(key for key in known.values() if _is_field(key, known))
+    known = reference().values()
+    sections = {each.path for each in known if each.inside and each.accepted[:9] == "a mapping"}
+    inside = {"", *sections} - {"study"}  # keys below a list of mappings have no field
+    return tuple(
+        key for key in known if key.path not in sections and key.path.rpartition(".")[0] in inside
+    )
 
 
 class Form:

@@ -3,7 +3,6 @@
 import re
 import sqlite3
 from contextlib import closing
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -18,20 +17,13 @@ _DEEPEST = 22
 """The greatest zoom of the map, at which a pixel is 4 cm at the equator. Chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class Background:
-    """A background map: where its tiles are, who made it, and up to which zoom it has any."""
-
-    url: str
-    attribution: str
-    deepest: int
-
-
-OPEN_STREET_MAP = Background(
-    f"{TILES}/{{z}}/{{x}}/{{y}}.png",
-    '&copy; <a href="https://openstreetmap.org/copyright">OpenStreetMap</a> contributors',
-    19,
-)
+OPEN_STREET_MAP: dict[str, Any] = {
+    "url": f"{TILES}/{{z}}/{{x}}/{{y}}.png",
+    "attribution": '&copy; <a href="https://openstreetmap.org/copyright">OpenStreetMap</a> '
+    "contributors",
+    "deepest": 19,
+}
+"""A background map: where its tiles are, who made it, and up to which zoom it has any."""
 
 
 class TileFile:
@@ -57,9 +49,11 @@ class TileFile:
         if not isinstance(most, int) or most < 0:
             raise InputError(f"--mbtiles {path}: there are no tiles in it")
         self.media_type = _IMAGES[kind]
-        attribution = re.sub("<[^>]*>", "", str(told.get("attribution", "")))
-        deepest = min(most, _DEEPEST)
-        self.background = Background("tiles/{z}/{x}/{y}", escape(attribution), deepest)
+        self.background: dict[str, Any] = {
+            "url": "tiles/{z}/{x}/{y}",
+            "attribution": escape(re.sub("<[^>]*>", "", str(told.get("attribution", "")))),
+            "deepest": min(most, _DEEPEST),
+        }
 
     def tile(self, zoom: int, x: int, y: int) -> bytes | None:
         """Return the picture in column `x` and row `y`, from the north, at `zoom`; None: none."""

@@ -36,7 +36,8 @@ def test_rows_are_counted_from_the_north(tmp_path: Path) -> None:
     for place in ((2, 1, 1), (2, 2, 1), (2, 4, 0), (2, 0, -1), (-1, 0, 0), (99, 0, 0)):
         assert file.tile(*place) is None
     assert file.media_type == "image/jpeg"
-    assert (file.background.attribution, file.background.deepest) == ("me &amp; you", 2)
+    background = {"url": "tiles/{z}/{x}/{y}", "attribution": "me &amp; you", "deepest": 2}
+    assert file.background == background
 
 
 def test_a_file_that_is_no_map_is_one_clear_error(tmp_path: Path) -> None:
