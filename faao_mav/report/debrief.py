@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.logs import read_log
@@ -20,9 +19,6 @@ from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
 from faao_mav.validate.words import counted
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result, debriefing_as_dict, with_mission
-
-_RADIO = ("levels", "base_station_db", "ground_user_db")
-"""What `--json` calls what a radio told: see `FromLog`."""
 
 _SAME = 1e-5
 """Relative difference of two parameters that single precision does not tell apart."""
@@ -95,17 +91,65 @@ class FromLog:
         nearest = min(found, key=lambda pair: pair[1].flown.rms_position_error)
         return cls(result, records, *nearest)
 
-    @property
-    def _wind(self) -> Real | None:
-        """The velocity of the air as the autopilot estimated it, m/s east and north, or None."""
-        return self.record.mean_wind(self.found.start, self.result.solution.plan.flight.duration)
+    def as_dict(self) -> dict[str, Any]:
+        """Return the JSON object of `--json`.
+
+        Beside what became of the plan it has the `wind`, m/s east and north, as the autopilot
+        estimated it; `parameters` that are other than the mission is timed for, with the value in
+        the log and that; and the `radio`.
+        """
+        known, plan = self.record.parameters, self.result.solution.plan
+        wind = self.record.mean_wind(self.found.start, plan.flight.duration)
+        return debriefing_as_dict(self.found) | {
+            "wind": None if wind is None else wind.tolist(),
+            "parameters": {
+                name: (known[name], due)
+                for name, due in self._timed.items()
+                if name in known and not math.isclose(known[name], due, rel_tol=_SAME)
+            },
+            "system": self.record.system,
+            "radio": self._radio(),
+        }
+
+    def lines(self) -> Iterator[Line]:
+        """Yield what became of the plan, and what else the log says."""
+        yield from _debriefing_lines(self.found)
+        told = self.as_dict()
+        if radio := told["radio"]:
+            levels = f"{counted(radio['levels'], 'level')} of a telemetry radio"
+            apart = f"{radio['base_station_db']:.1f} dB rms from the planned gain of the base "
+            apart += f"station, {radio['ground_user_db']:.1f} of the ground user"
+            law = "faao-mission link fits a law to them"
+            yield "radio", f"{levels}: their shape is {apart}; {law}"
+        if len(self.records) > 1:
+            others = ", ".join(str(r.system) for r in self.records if r is not self.record)
+            yield "vehicle", f"system {told['system']}, by its flight; also in the log: {others}"
+        if told["wind"] is None:
+            yield "wind", "not estimated by the autopilot"
+        else:
+            east, north = told["wind"]
+            start = math.degrees(math.atan2(-east, -north)) % 360
+            speed = f"{math.hypot(east, north):.1f} m/s"
+            yield "wind", f"{speed} from {start:.0f} degrees, as estimated"
+        held = self._timed.keys() & self.record.parameters.keys()
+        if other := told["parameters"]:
+            text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in other.items())
+            yield "parameters", f"other than the mission is timed for: {text}"
+        elif held:
+            yield "parameters", f"{len(held)} in the log, as the mission is timed for"
+        elif self._timed:
+            yield "parameters", "not in the log"
 
     @property
-    def _radio(self) -> tuple[int, float, float] | None:
-        """How many levels its radio told, and how far their shape is from the planned gains.
+    def _timed(self) -> Mapping[str, float]:
+        """The parameters that the mission is timed for."""
+        return self.result.conversion.parameters if self.result.conversion is not None else {}
+
+    def _radio(self) -> dict[str, Any] | None:
+        """Return how many levels its radio told, and how far they are from the planned gains.
 
         That is the rms difference, dB, within a constant and by the steps of SiK radios, of both
-        hops: base station, ground user. None where it told none on the way.
+        hops. None where it told none on the way.
         """
         plan = self.result.solution.plan
         flight = self.record.line(self.result.solution, self.found.start)
@@ -117,58 +161,5 @@ class FromLog:
             - law.db(lengths(flight.w[told] - station.at(flight.t[told])), plan.flight.altitude)
             for law, station in zip(plan.radio.path_gains, plan.radio.stations, strict=True)
         ]
-        return int(told.sum()), float(np.std(apart[0])), float(np.std(apart[1]))
-
-    @property
-    def _timed(self) -> Mapping[str, float]:
-        """The parameters in the log that the mission is timed for, as it is timed."""
-        timed = self.result.conversion.parameters if self.result.conversion is not None else {}
-        return {name: value for name, value in timed.items() if name in self.record.parameters}
-
-    @property
-    def _other(self) -> dict[str, tuple[float, float]]:
-        """By name the value in the log and the one that the mission is timed for, if another."""
-        known = self.record.parameters
-        return {
-            name: (known[name], value)
-            for name, value in self._timed.items()
-            if not math.isclose(known[name], value, rel_tol=_SAME)
-        }
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the JSON object of `--json`."""
-        return debriefing_as_dict(self.found) | {
-            "wind": None if self._wind is None else self._wind.tolist(),
-            "parameters": self._other,
-            "system": self.record.system,
-            "radio": self._radio and dict(zip(_RADIO, self._radio, strict=True)),
-        }
-
-    def lines(self) -> Iterator[Line]:
-        """Yield what became of the plan, and what else the log says."""
-        yield from _debriefing_lines(self.found)
-        if self._radio is not None:
-            count, first, second = self._radio
-            told = (
-                f"{counted(count, 'level')} of a telemetry radio: their shape is {first:.1f} dB rms"
-            )
-            told += f" from the planned gain of the base station, {second:.1f} of the ground user"
-            yield "radio", f"{told}; faao-mission link fits a law to them"
-        if len(self.records) > 1:
-            others = ", ".join(str(r.system) for r in self.records if r is not self.record)
-            told = f"system {self.record.system}, by its flight; also in the log: {others}"
-            yield "vehicle", told
-        if self._wind is None:
-            yield "wind", "not estimated by the autopilot"
-        else:
-            east, north = map(float, self._wind)
-            start = math.degrees(math.atan2(-east, -north)) % 360
-            told = f"{math.hypot(east, north):.1f} m/s from {start:.0f} degrees, as estimated"
-            yield "wind", told
-        if other := self._other:
-            text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in other.items())
-            yield "parameters", f"other than the mission is timed for: {text}"
-        elif self._timed:
-            yield "parameters", f"{len(self._timed)} in the log, as the mission is timed for"
-        elif self.result.conversion is not None and self.result.conversion.parameters:
-            yield "parameters", "not in the log"
+        base, user = (float(np.std(each)) for each in apart)
+        return {"levels": int(told.sum()), "base_station_db": base, "ground_user_db": user}

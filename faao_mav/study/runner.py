@@ -20,21 +20,17 @@ def run_case(case: StudyCase) -> StudyRow:
     """Return the row of `case`; whatever goes wrong becomes the row's error."""
     from threadpoolctl import threadpool_limits
 
-    empty = StudyRow(case.key, dict(case.values), case.scheme, case.seed)
-    try:
-        with threadpool_limits(1):  # the cores are taken by other cases
-            return _filled(empty, case)
-    except FaaoError as error:
-        return replace(empty, error=str(error))
-    except Exception as error:  # a fault in one case must not cost the others
-        return replace(empty, error=f"{type(error).__name__}: {error}")
-
-
-def _filled(row: StudyRow, case: StudyCase) -> StudyRow:
     from faao_mav.plan import parse_plan
     from faao_mav.workflow import optimize_plan
 
-    result = optimize_plan(parse_plan(case.text, case.source))
+    row = StudyRow(case.key, dict(case.values), case.scheme, case.seed)
+    try:
+        with threadpool_limits(1):  # the cores are taken by other cases
+            result = optimize_plan(parse_plan(case.text, case.source))
+    except FaaoError as error:
+        return replace(row, error=str(error))
+    except Exception as error:  # a fault in one case must not cost the others
+        return replace(row, error=f"{type(error).__name__}: {error}")
     solution, rates, information = result.solution, result.solution.rates, result.information
     return replace(
         row,
