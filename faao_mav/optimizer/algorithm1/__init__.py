@@ -20,7 +20,7 @@ the line of sight depends on the position (`ula`), H_r is constant within (27), 
 recomputed after it. (35) falls apart into one problem per link.
 """
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,7 @@ from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
 from faao_mav.optimizer.algorithm1.trajectory_step import link_sum, optimize_trajectory
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.precoder import SCHEMES
@@ -41,11 +41,10 @@ MAX_CONES = 300_000
 
 @dataclass(frozen=True, slots=True)
 class _Iterate:
-    """A trajectory, and for both links H_r and the precoders, with R_avg of (9), bit/s/Hz."""
+    """A trajectory and the precoders of both links, with R_avg of (9), bit/s/Hz."""
 
     flight: Trajectory
-    fading: tuple[Complex, Complex]
-    precoders: tuple[Complex, Complex]
+    precoders: list[Complex]
     rate: float
 
 
@@ -59,63 +58,55 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
     """
     _check_plan(problem)
     options = problem.plan.optimizer
-
-    def equal_power(_: int, link: Link, H: Complex) -> Complex:
-        N = link.transmit
-        return np.tile(np.sqrt(link.power / N) * np.eye(N) + 0j, (len(H), 1, 1))
-
-    iterates = [_iterate_at(problem, straight_flight(problem.kinematics), equal_power)]
+    iterates = [_iterate_at(problem, straight_flight(problem.kinematics))]
     converged, ending = False, f"max_iterations ({options.max_iterations}) reached"
     for iteration in range(1, options.max_iterations + 1):
+        last, best = iterates[-1], max(iterate.rate for iterate in iterates)
 
-        def tell(stage: str, iteration: int = iteration) -> None:
+        def tell(stage: str, iteration: int = iteration, best: float = best) -> None:
             if observe is not None:
-                best = max(iterate.rate for iterate in iterates)
                 observe(Progress(iteration, options.max_iterations, stage, best))
 
         try:
-            iterates.append(_next(problem, iterates[-1], tell))
+            tell("trajectory (27)")
+            sums = tuple(
+                link_sum(link, link.small_scale(last.flight.w), P)
+                for link, P in zip(problem.links, last.precoders, strict=True)
+            )
+            flight = optimize_trajectory(problem, sums, last.flight)
+            tell("precoders (35)")
+            iterates.append(_iterate_at(problem, flight, last.precoders))
         except SolverError as error:
             ending = f"stopped in iteration {iteration}, the best so far is kept: {error}"
             break
-        if abs(iterates[-1].rate - iterates[-2].rate) < options.tolerance:
+        if abs(iterates[-1].rate - last.rate) < options.tolerance:
             converged, ending = True, f"R_avg changed by less than {options.tolerance:g} bit/s/Hz"
             break
-    best = max(reversed(iterates), key=lambda iterate: iterate.rate)
+    found = max(reversed(iterates), key=lambda iterate: iterate.rate)
     history = [iterate.rate for iterate in iterates]
     return make_solution(
-        problem, best.flight, best.precoders, history, converged=converged, ending=ending
-    )
-
-
-def _next(problem: Problem, last: _Iterate, tell: Callable[[str], None]) -> _Iterate:
-    """Return the next iterate, by steps 3 and 4."""
-    tell("trajectory (27)")
-    both = zip(problem.links, last.fading, last.precoders, strict=True)
-    flight = optimize_trajectory(problem, tuple(link_sum(*one) for one in both), last.flight)
-    tell("precoders (35)")
-    return _iterate_at(
-        problem, flight, lambda j, link, H: optimize_precoders(link, H, last.precoders[j])
+        problem, found.flight, found.precoders, history, converged=converged, ending=ending
     )
 
 
 def _iterate_at(
-    problem: Problem, flight: Trajectory, precoders: Callable[[int, Link, Complex], Complex]
+    problem: Problem, flight: Trajectory, last: Sequence[Complex] | None = None
 ) -> _Iterate:
-    """Return the iterate at `flight`, with the plan's scheme or else `precoders`.
-
-    These are given for the number of a link, the link and its channels H, (1) or (2).
-    """
+    """Return the iterate at `flight`: the plan's scheme, or (35) from `last`, or equal powers."""
     scheme = SCHEMES.get(problem.plan.optimizer.precoder)
-    fading, chosen, rates = [], [], []
+    precoders, rates = [], []
     for number, link in enumerate(problem.links):
-        H_r = link.small_scale(flight.w)
+        H_r, N = link.small_scale(flight.w), link.transmit
         H = link.channel(flight.w, H_r)
-        P = scheme(H, link.power, link.noise) if scheme else precoders(number, link, H)
-        fading.append(H_r)
-        chosen.append(P)
+        if scheme is not None:
+            P = scheme(H, link.power, link.noise)
+        elif last is not None:
+            P = optimize_precoders(link, H, last[number])
+        else:
+            P = np.tile(np.sqrt(link.power / N) * np.eye(N) + 0j, (len(H), 1, 1))
+        precoders.append(P)
         rates.append(float(link.rates(flight.w, H_r, P).mean()))
-    return _Iterate(flight, (fading[0], fading[1]), (chosen[0], chosen[1]), min(rates))
+    return _Iterate(flight, precoders, min(rates))
 
 
 def _check_plan(problem: Problem) -> None:

@@ -8,13 +8,12 @@ start, which it never falls below.
 
 Method. All there is are inequalities g(x_n) >= 0 of the unknowns of a slot (position, velocity,
 acceleration, and those of the queue) or of their sums, and linear equations from slot to slot. It
-is a primal-dual method with a predictor and a corrector (Mehrotra); inequalities that a start does
-not keep with room to spare are widened by a margin that is driven to zero. A Newton step is one
-banded LU. Of the curvature of the Lagrangian as much counts as leaves the model convex, by Cholesky
-factors; where the functions are then worse than modelled, a proximal term shortens the step.
-Repeated short steps mean that the iterates hug the limits: then the multipliers are centred anew.
-With a least speed, where a flight can turn as a whole, and where a fence turns its half-planes, mu
-waits for the iterates.
+is a primal-dual method whose barrier parameter mu waits for the iterates; inequalities that a start
+does not keep with room to spare are widened by a margin that is driven to zero. A Newton step is
+one banded LU. Of the curvature of the Lagrangian as much counts as leaves the model convex, by
+Cholesky factors; where the functions are then worse than modelled, a proximal term shortens the
+step. Repeated short steps mean that the iterates hug the limits: then the multipliers are centred
+anew.
 
 Files: `maximize` is the entry; `search` iterates, `newton` takes one step, `chain` is its matrix;
 `rewards` and `queue` are what is maximised, `speed_limits`, `energy` and `fence` what is kept. To
