@@ -89,7 +89,7 @@ class MockAutopilot(Machine[None]):
         self._battery, self._tells_asked_mode, self._current = battery, False, 0
         self._period = 1 / rate / speedup if rate > 0 else math.inf
         self._booted = self._now = self._next_beat = self._next_report = 0.0
-        self._ready_at = boot
+        self._first = home_items(self.vehicle, MissionType.MISSION)
 
     @property
     def armed(self) -> bool:
@@ -110,35 +110,33 @@ class MockAutopilot(Machine[None]):
         """Boot."""
         self._booted = self._now = self._next_beat = now
         self._next_report = now if self._period < math.inf else math.inf
-        self._ready_at = now + self._boot
         return self.tick(now)
 
     def reboot(self, now: float) -> None:
         """Begin anew; what is stored stays, what is under way is lost."""
         self.lists.reset()
         self.flight.stop()
-        self._current = 0
-        self._booted, self._ready_at = now, now + self._boot
+        self._current, self._booted = 0, now
 
     def posture(self, now: float) -> Posture:
         """Return where the aircraft is."""
-        return self.flight.aircraft.at(self._clock(now))
+        self._now = max(now, self._now)
+        return self.flight.aircraft.at(self._clock)
 
     def mission(self) -> Mission:
         """Return what is stored, as a mission."""
         return mission_of({part: self.lists.items(part) for part in MissionType}, self.vehicle)
 
-    def _clock(self, now: float) -> float:
-        """Return the time on its own clock, s since it booted."""
-        return (now - self._booted) * self._speedup
+    @property
+    def _clock(self) -> float:
+        """The time on its own clock, s since it booted."""
+        return (self._now - self._booted) * self._speedup
 
     def _is_ready(self) -> bool:
-        return self._now >= self._ready_at
+        return self._now >= self._booted + self._boot
 
     def _knows_place(self) -> bool:
-        return self._now >= self._ready_at + self._place
-
-    # ---- what it says by itself
+        return self._now >= self._booted + self._boot + self._place
 
     def _time_out(self, now: float) -> Sequence[Message]:
         late = now - self.deadline
@@ -147,24 +145,25 @@ class MockAutopilot(Machine[None]):
         self._now = now
         out = self.lists.tick(now)
         if self.armed:
-            out += self._follow(now)
+            out += self._follow()
         if now >= self._next_beat:
             self._next_beat = now + self._beat
-            out += [self._heartbeat(), self._mission_current(now)]
-            # It tells that its checks pass, once it is ready, and how its battery is.
+            out += [self._heartbeat(), self._mission_current()]
             passes = protocol.PREARM_CHECK * self._is_ready()
             out.append(messages.SysStatus(passes, 12_600, self._battery))
             out.append(messages.BatteryStatus(0, 1, self._battery))
-            if self._tells_asked_mode:
-                out.append(messages.CurrentMode(self.flight.mode, self.flight.asked_mode))
+            out += [self._modes()] * self._tells_asked_mode
         if now >= self._next_report:
             self._next_report = now + self._period
-            out += self._place_reports(now)
+            out += self._place_reports()
         return out
 
-    def _place_reports(self, now: float) -> list[Message]:
+    def _modes(self) -> Message:
+        return messages.CurrentMode(self.flight.mode, self.flight.asked_mode)
+
+    def _place_reports(self) -> list[Message]:
         """Return where it is, on Earth first; what it tells of that while it does not know."""
-        time, posture = int(self._clock(now) * 1000) % 2**32, self.posture(now)
+        time, posture = int(self._clock * 1000) % 2**32, self.flight.aircraft.at(self._clock)
         (east, north, up), (v_east, v_north, v_up) = map(list, (posture.position, posture.velocity))
         frame = LocalFrame(self.home.latitude, self.home.longitude)
         latitude, longitude = map(float, frame.to_geodetic([east, north]))
@@ -185,10 +184,9 @@ class MockAutopilot(Machine[None]):
         local = messages.LocalPositionNed(time, north, east, -up, v_north, v_east, -v_up)
         return [place, local, messages.Attitude(time, heading)]
 
-    def _follow(self, now: float) -> list[Message]:
+    def _follow(self) -> list[Message]:
         """Let the flight go on, and tell what becomes of it."""
-        flight, clock = self.flight, self._clock(now)
-        first = home_items(self.vehicle, MissionType.MISSION)
+        flight, clock, first = self.flight, self._clock, self._first
         out: list[Message] = [messages.MissionItemReached(n + first) for n in flight.reached(clock)]
         before = flight.mode
         if flight.leaves_fence(clock):
@@ -201,7 +199,7 @@ class MockAutopilot(Machine[None]):
             returns = [row for row in rows if row.command == Command.NAV_RETURN_TO_LAUNCH]
             if returns and self.vehicle.kind in self.behaviour.returns_by_mode:
                 flight.mode = flight.modes.at_fence.get("return", flight.mode)
-            out.append(self._mission_current(now))
+            out.append(self._mission_current())
         if flight.aircraft.landed(clock):
             flight.land()
             out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
@@ -209,12 +207,11 @@ class MockAutopilot(Machine[None]):
             out.append(self._heartbeat())
         return out
 
-    def _mission_current(self, now: float) -> Message:
-        rows = len(self.lists.items(MissionType.MISSION))
-        total = max(rows - home_items(self.vehicle, MissionType.MISSION), 0)
+    def _mission_current(self) -> Message:
+        total = len(self.lists.items(MissionType.MISSION)[self._first :])
         # MISSION_STATE: none, not started, active
         state = 1 if total == 0 else 3 if self.flight.on_mission else 2
-        if self.flight.on_mission and self._clock(now) >= self.flight.aircraft.arrives:
+        if self.flight.on_mission and self._clock >= self.flight.aircraft.arrives:
             state = protocol.MISSION_COMPLETE
         number = self.lists.number(MissionType.MISSION)
         return messages.MissionCurrent(self._current, total, state, number)
@@ -227,14 +224,12 @@ class MockAutopilot(Machine[None]):
         autopilot = self.vehicle.family.mav_autopilot
         return messages.Heartbeat(self.vehicle.mav_types[0], autopilot, flags, self.mode, state)
 
-    # ---- what it answers
-
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self._now = now
         sender, message = envelope.sender, envelope.message
         match message:
             case messages.Timesync(tc1=asked, ts1=theirs):
-                here = int(self._clock(now) * 1e9) + 1
+                here = int(self._clock * 1e9) + 1
                 return [messages.Timesync(here, theirs)] if asked == 0 else ()
             case messages.SetMode(target_system=system):
                 target = Address(system, 0)
@@ -249,47 +244,46 @@ class MockAutopilot(Machine[None]):
             return ()
         match message:
             case CommandLong():
-                return self._on_command(sender, message, now)
+                return self._on_command(sender, message)
             case messages.SetMode(custom_mode=mode):
-                return [messages.CommandAck(sender, _SET_MODE, self._set_mode(mode, now))]
+                return [messages.CommandAck(sender, _SET_MODE, self._set_mode(mode))]
             case messages.ParamRequestList() | messages.ParamRequestRead() | messages.ParamSet():
                 return self.parameters.on(message)
             case messages.SetPositionTargetLocalNed():
-                comes_back = self.flight.hear(message, self._clock(now))
-                modes = messages.CurrentMode(self.flight.mode, self.flight.asked_mode)
-                return [self._heartbeat(), modes] if comes_back else ()
+                comes_back = self.flight.hear(message, self._clock)
+                return [self._heartbeat(), self._modes()] if comes_back else ()
             case messages.ListMessage() if self._is_ready() or not self.behaviour.silent_at_boot:
                 return self.lists.on(sender, message, now)
         return ()
 
-    def _on_command(self, sender: Address, command: CommandLong, now: float) -> list[Message]:
+    def _on_command(self, sender: Address, command: CommandLong) -> list[Message]:
         result, answers = ACCEPTED, list[Message]()
         match command.command:
             case MavCommand.ARM:
-                result = self._arm(command.param1 >= 0.5, now)
+                result = self._arm(command.param1 >= 0.5)
                 why = self._why_not_armed() if result == self.behaviour.denied else None
                 if why is not None:
                     answers.append(Statustext(MavSeverity.CRITICAL, f"Arm: {why}"))
             case MavCommand.TAKEOFF:
-                climbs = self.flight.take_off(command.param7, self._clock(now))
+                climbs = self.flight.take_off(command.param7, self._clock)
                 result = ACCEPTED if climbs else DENIED
             case MavCommand.START if not self._knows_place():
                 result = FAILED
             case MavCommand.START:
-                self.flight.enter(self.flight.modes.mission, self._clock(now))
-                result = self._begin(now)
+                self.flight.enter(self.flight.modes.mission, self._clock)
+                result = self._begin()
             case MavCommand.SET_MODE:
                 flags, main, sub = map(whole, (command.param1, command.param2, command.param3))
                 custom = flags > 0 and flags & _CUSTOM_MODE
                 mode = self.behaviour.requested_mode(main, sub) if custom else None
-                result = self.behaviour.no_mode if mode is None else self._set_mode(mode, now)
+                result = self.behaviour.no_mode if mode is None else self._set_mode(mode)
             case MavCommand.SET_CURRENT:
                 number, rows = whole(command.param1), self.lists.items(MissionType.MISSION)
                 if number not in range(len(rows)):
                     result = DENIED
                 else:
                     self._current = number
-                    answers.append(self._mission_current(now))
+                    answers.append(self._mission_current())
             case MavCommand.REQUEST_MESSAGE:
                 answers += self._asked_for(whole(command.param1))
                 result = ACCEPTED if answers else UNSUPPORTED
@@ -300,7 +294,7 @@ class MockAutopilot(Machine[None]):
                 if command.param1 == protocol.POSITION and period > 0 and self._period < math.inf:
                     self._period = period / 1e6 / self._speedup
             case MavCommand.REBOOT:
-                self.reboot(now)
+                self.reboot(self._now)
             case _:
                 result = UNSUPPORTED
         return [messages.CommandAck(sender, command.command, result), *answers]
@@ -313,22 +307,22 @@ class MockAutopilot(Machine[None]):
                 version = 0x04_06_00_FF
                 return [messages.AutopilotVersion(_CAPABILITIES, version, self.address.system)]
             case protocol.POSITION:
-                return self._place_reports(self._now)[:1]
+                return self._place_reports()[:1]
             case protocol.HOME_POSITION:
                 return [messages.HomePosition(*spot)]
             case protocol.LOCAL_ORIGIN:
                 return [messages.GpsGlobalOrigin(*spot)]
         return []
 
-    def _arm(self, wanted: bool, now: float) -> int:
+    def _arm(self, wanted: bool) -> int:
         if not wanted:
             self.flight.stop()
             return ACCEPTED
         if self._why_not_armed() is not None:
             return self.behaviour.denied
         if not self.armed:
-            self.flight.arm(self._clock(now))
-        return self._begin(now) if self.mode == self.flight.modes.mission else ACCEPTED
+            self.flight.arm(self._clock)
+        return self._begin() if self.mode == self.flight.modes.mission else ACCEPTED
 
     def _why_not_armed(self) -> str | None:
         """Return what it says when it does not arm, None if it does."""
@@ -343,14 +337,14 @@ class MockAutopilot(Machine[None]):
         outside = self.behaviour.armed_inside_only and self.flight.is_outside(fence, np.zeros(3))
         return "Vehicle breaching Polygon fence" if outside else None
 
-    def _set_mode(self, mode: int, now: float) -> int:
-        modes, clock = self.flight.modes, self._clock(now)
+    def _set_mode(self, mode: int) -> int:
+        modes, clock = self.flight.modes, self._clock
         if mode == modes.mission and self._problem():
             return self.behaviour.denied
         if mode == modes.guided and not self.flight.accepts_guided(clock):
             return self.behaviour.denied
         self.flight.enter(mode, clock)
-        return self._begin(now) if mode == modes.mission else ACCEPTED
+        return self._begin() if mode == modes.mission else ACCEPTED
 
     def _problem(self) -> str:
         """Return why what is stored cannot be flown, "" if it can."""
@@ -360,12 +354,12 @@ class MockAutopilot(Machine[None]):
             return str(error)
         return self.behaviour.infeasible(mission) if mission.items else "no mission"
 
-    def _begin(self, now: float) -> int:
+    def _begin(self) -> int:
         """Fly the mission, once armed and told to; not a second time."""
         if self._problem():
             return DENIED
         mission = replace(self.mission(), home=self.home)
-        return ACCEPTED if self.flight.begin(mission, self._clock(now)) else DENIED
+        return ACCEPTED if self.flight.begin(mission, self._clock) else DENIED
 
 
 def _fitted(value: float, bits: int) -> int:

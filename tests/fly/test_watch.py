@@ -58,7 +58,7 @@ def test_a_late_answer_to_arming_is_none_to_disarming() -> None:
 def test_what_refuses_to_disarm_is_told_as_armed(kind: str) -> None:
     scene = refusing(kind)
     arm = scene.mock._arm
-    scene.mock._arm = lambda wanted, now: arm(True, now) if wanted else 4
+    scene.mock._arm = lambda wanted: arm(True) if wanted else 4
     assert scene.run() == "refused"
     assert "it may still be armed: it answers ARM with FAILED" in scene.watch.outcome.text
     assert scene.commands.count(DISARM) == 5
