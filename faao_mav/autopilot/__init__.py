@@ -14,7 +14,6 @@ from faao_mav.autopilot.px4 import PX4_PLANE as PX4_PLANE
 from faao_mav.autopilot.vehicle import Vehicle as Vehicle
 from faao_mav.autopilot.vehicle import autopilots as autopilots
 from faao_mav.autopilot.vehicle import families as families
-from faao_mav.autopilot.vehicle import family as family
 from faao_mav.autopilot.vehicle import kind_by_number as kind_by_number
 from faao_mav.autopilot.vehicle import kinds as kinds
 from faao_mav.autopilot.vehicle import register as register

@@ -7,9 +7,7 @@ from pathlib import Path
 from faao_mav.autopilot.vehicle import (
     Vehicle,
     families,
-    family,
     kind_by_number,
-    vehicle_type_by_numbers,
 )
 from faao_mav.autopilot.vehicle_type import VehicleType
 from faao_mav.mission.formats import MissionFile, PlanTarget
@@ -27,17 +25,6 @@ def plan_target(vehicle: Vehicle | None) -> PlanTarget | None:
     return PlanTarget(
         own.family.mav_autopilot, own.mav_types[0], takes_null=not own.dialect.unset_is_zero
     )
-
-
-def vehicle_in(file: MissionFile) -> Vehicle | None:
-    """Return the vehicle that a mission file names, None if it names none that is known.
-
-    The type is the autopilot's first where the file leaves it open (MAV_TYPE 0).
-    """
-    if file.firmware is None:
-        return None
-    found = vehicle_type_by_numbers(file.firmware, file.vehicle_type or None)
-    return None if found is None else Vehicle(found.family.key, found.kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +47,13 @@ def made_for(path: Path, file: MissionFile, planned: Vehicle | None = None) -> M
     if planned is not None:
         return MadeFor(planned.autopilot, planned.kind, "as the plan says")
     if file.firmware is not None:
-        keys = [each.key for each in families() if each.mav_autopilot == file.firmware]
+        keys = [key for key, each in families().items() if each.mav_autopilot == file.firmware]
         kind = None
         if file.vehicle_type:
             unknown = f"vehicle of MAV_TYPE {file.vehicle_type}"
             kind = kind_by_number(file.vehicle_type) or unknown
         return MadeFor(keys[0] if keys else None, kind, "as the file says")
-    beside = [each.key for each in families() if parameter_path(path, each.key).is_file()]
+    beside = [each for each in families() if parameter_path(path, each).is_file()]
     if len(beside) != 1:
         return MadeFor()
     return MadeFor(beside[0], None, f"as {parameter_path(path, beside[0]).name} beside it says")
@@ -88,15 +75,15 @@ def parameter_path(mission: Path, autopilot: str) -> Path:
     >>> parameter_path(Path("flight.plan"), "px4").name
     'flight.params'
     """
-    return mission.with_suffix(family(autopilot).parameter_suffix)
+    return mission.with_suffix(families()[autopilot].parameter_suffix)
 
 
 def autopilot_of(parameters: Iterable[str]) -> str | None:
     """Return whose names `parameters` are, None where they do not tell."""
     names = tuple(parameters)
     found = [
-        each.key
-        for each in families()
+        key
+        for key, each in families().items()
         if any(name.startswith(each.parameter_prefixes) for name in names)
     ]
     return found[0] if len(found) == 1 else None

@@ -239,7 +239,7 @@ def autopilots() -> tuple[str, ...]:
     >>> autopilots()
     ('ardupilot', 'px4')
     """
-    return tuple(each.key for each in families())
+    return tuple(families())
 
 
 def kinds() -> tuple[str, ...]:
@@ -251,18 +251,9 @@ def kinds() -> tuple[str, ...]:
     return tuple(dict.fromkeys(each.kind for each in _TYPES.values()))
 
 
-def families() -> tuple[AutopilotFamily, ...]:
-    """Return every autopilot that is known."""
-    return tuple({each.family.key: each.family for each in _TYPES.values()}.values())
-
-
-def family(autopilot: str) -> AutopilotFamily:
-    """Return the autopilot with this name; raises `InputError` if there is none."""
-    for each in families():
-        if each.key == autopilot:
-            return each
-    known = ", ".join(each.key for each in families())
-    raise InputError(f"autopilot: {autopilot} is unknown; known are {known}")
+def families() -> dict[str, AutopilotFamily]:
+    """Return every autopilot that is known, by its name."""
+    return {each.family.key: each.family for each in _TYPES.values()}
 
 
 def kind_by_number(mav_type: int | None) -> str | None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from faao_mav.autopilot import Vehicle, autopilots, family, kinds
+from faao_mav.autopilot import Vehicle, autopilots, families, kinds
 from faao_mav.autopilot.files import MadeFor, autopilot_of, made_for, parameter_path
 from faao_mav.errors import InputError
 from faao_mav.mission.formats.parameter_file import read_parameters
@@ -63,9 +63,9 @@ def choose_vehicle(
         theirs = autopilot_of(given)
     if theirs not in (None, whose):
         raise InputError(
-            f"{parameters}: parameters of {family(theirs).name}, but the mission is for "
-            f"{family(whose).name} ({by}): give the vehicle's own (--parameters), or --autopilot "
-            f"{theirs}"
+            f"{parameters}: parameters of {families()[theirs].name}, but the mission is for "
+            f"{families()[whose].name} ({by}): give the vehicle's own (--parameters), or "
+            f"--autopilot {theirs}"
         )
     kind = kind or told.kind or base.kind
     return Vehicle(whose, kind, values, source, base.body if kind == base.kind else None), by

@@ -279,7 +279,9 @@ class Session(WireLink):
             "or a recording of it?"
         )
         if old:
-            ports = [f"{each.name}: {each.mavlink_2}" for each in families() if each.mavlink_2]
+            ports = [
+                f"{each.name}: {each.mavlink_2}" for each in families().values() if each.mavlink_2
+            ]
             why = (
                 "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
                 f"2 ({'; '.join(ports)})"

@@ -107,7 +107,7 @@ def test_vehicles_are_found_by_name_and_number() -> None:
         assert (each.flight_model is None) == bool(each.unmodelled)
         for number in each.mav_types:
             assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each
-    assert len({each.mav_autopilot for each in families()}) == len(families())
+    assert len({each.mav_autopilot for each in families().values()}) == len(families())
     assert vehicle_type_by_numbers(3, None) is ARDUCOPTER
     assert vehicle_type_by_numbers(3, 10) is None
     with pytest.raises(InputError, match="betaflight copter is unknown; known are ardupilot"):
