@@ -80,10 +80,14 @@ def preflight(
         *(each for each in judged.findings if each.level is not Level.NOTE),
         *_by_itself(flight, held, seen, judged.vehicle),
     ]
-    if elsewhere:
-        found = [_overruled(each, "place-", "--elsewhere") for each in found]
-    if untimed:
-        found = [_overruled(each, "timing-", "--untimed") for each in found]
+    for rules, option, given in (
+        ("place-", "--elsewhere", elsewhere),
+        ("timing-", "--untimed", untimed),
+    ):
+        for k, each in enumerate(found):
+            if given and each.level is Level.ERROR and each.rule.startswith(rules):
+                action = f"{option}: flown all the same"
+                found[k] = replace(each, level=Level.WARNING, action=action)
     return tuple(sorted(found, key=lambda each: [*Level].index(each.level)))
 
 
@@ -91,13 +95,6 @@ def _found(row: str, level: Level | None = None, rule: str = "", **values: objec
     """Return what a `row` of the table says of `values`, at its own level and under its own id."""
     found = _TABLE[row].finding(None, values)
     return replace(found, level=level or found.level, rule=rule or found.rule)
-
-
-def _overruled(found: Finding, rules: str, option: str) -> Finding:
-    """Return what was `found`; an error by one of the `rules` as a warning that names `option`."""
-    if found.level is not Level.ERROR or not found.rule.startswith(rules):
-        return found
-    return replace(found, level=Level.WARNING, action=f"{option}: flown all the same")
 
 
 def _judged(flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool) -> Check:
@@ -263,9 +260,9 @@ def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Ite
 class Readiness:
     """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
 
-    For what is `allowed` see `preflight`. `findings` is what it found last, None before; `begun` is
-    when the vehicle was first heard, s. `judge` looks now and then; before it is armed `settle`
-    reads it again, while `on` is given what arrives.
+    For what is `allowed` see `preflight`. `findings` is what it found last, None before. `judge`
+    looks now and then; before it is armed `settle` reads it again, while `on` is given what
+    arrives.
     """
 
     def __init__(self, flight: Flight, held: Held, peer: Peer, **allowed: bool) -> None:
@@ -274,7 +271,6 @@ class Readiness:
         self.findings: tuple[Finding, ...] | None = None
         self._judged: tuple[object, ...] = ()
         self._reading: Script[Held] | None = None
-        self.begun = 0.0
 
     @property
     def errors(self) -> tuple[Finding, ...]:
@@ -293,7 +289,7 @@ class Readiness:
     def judge(self, seen: Telemetry, now: float, *, again: bool = False) -> None:
         """Judge what is heard, once enough is, and `again` or when that is another state."""
         known = seen.place is not None and seen.status is not None
-        if seen.heartbeat is None or not (known or now >= self.begun + _LOOK):
+        if seen.heartbeat is None or not (known or now >= seen.begun + _LOOK):
             return
         others = len(seen.stations), len(seen.strangers)
         state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others

@@ -95,7 +95,7 @@ class Telemetry:
     once its estimator knows where it is. `place` is where it is by `position`, m above the sea,
     None where it does not tell. `stations` are other ground stations that were heard, `strangers`
     addresses on the network from which something else speaks in its name. `ending` is why nothing
-    more can be known, None as long as something can.
+    more can be known, None as long as something can. `begun` is when it began to listen, s.
     """
 
     def __init__(self, peer: Peer, rows: Sequence[WireItem], rate: float = POSITION_RATE) -> None:
@@ -124,7 +124,7 @@ class Telemetry:
 
     def start(self, now: float) -> None:
         """Begin to listen."""
-        self._last_heard, self._is_silent = now, False
+        self.begun, self._last_heard, self._is_silent = now, now, False
         self._needed = dict.fromkeys(self._periods, now - _MISSED)
         self._next_reading = now
 

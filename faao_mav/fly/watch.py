@@ -130,7 +130,7 @@ class Watch(Machine[Ending]):
         """The modes of this phase, in the order in which they come; none: any."""
         self._furthest, self._armed, self._unattended = 0, False, False
         self._aside_since, self._disarmed_at = -math.inf, math.inf
-        self._begun, self._said_before = 0.0, 0
+        self._said_before = 0
         self._then = Ending("refused", "")
 
     @property
@@ -145,10 +145,7 @@ class Watch(Machine[Ending]):
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen, and ask for telemetry."""
-        self._begun = now
         self.seen.start(now)
-        if self._ready is not None:
-            self._ready.begun = now
         return self._time_out(now)
 
     def cancel(self, now: float) -> Sequence[Message]:
@@ -271,7 +268,7 @@ class Watch(Machine[Ending]):
         match self.phase:
             case "arming" if accepted:
                 return self._go_on(now)
-            case "arming" if self.streams and now < self._begun + PATIENCE:
+            case "arming" if self.streams and now < self.seen.begun + PATIENCE:
                 order.sent = 0
             case "arming":
                 order.sent, order.due = TRIES, now + _WORDS
@@ -318,7 +315,7 @@ class Watch(Machine[Ending]):
 
     def _check(self, now: float) -> Sequence[Message]:
         """Arm, if there is nothing against it."""
-        seen, ready, waited = self.seen, self._ready, now - self._begun
+        seen, ready, waited = self.seen, self._ready, now - self.seen.begun
         assert ready is not None
         ready.judge(seen, now)
         if self._stopped(ready):
