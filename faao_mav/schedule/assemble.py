@@ -1,5 +1,7 @@
 """From a route to mission items: take-off, the way to w_I, the route, the end."""
 
+import numpy as np
+
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
@@ -10,7 +12,6 @@ from faao_mav.schedule.route import Route
 from faao_mav.schedule.timing import SHORTEST_HOLD
 from faao_mav.schedule.transit import check_run_in, way_home, way_out
 
-_DECIMALS = 9  # of a latitude or longitude in degrees: 0.1 mm
 _PITCH = 15.0  # the least pitch of a plane's climb after take-off, degrees; chosen
 
 
@@ -44,8 +45,8 @@ def assemble(route: Route, plan: Plan) -> Mission:
     items = []
     if plan.mission.takeoff:
         # At 0, 0 ("here" for ArduPilot) PX4 would fly to the Gulf of Guinea.
-        here = (round(origin.latitude, _DECIMALS), round(origin.longitude, _DECIMALS))
-        items.append(_at(Command.NAV_TAKEOFF, here, altitude, 0.0 if vehicle.hovers else _PITCH))
+        (here,), pitch = _places(np.zeros((1, 2)), plan), 0.0 if vehicle.hovers else _PITCH
+        items.append(_at(Command.NAV_TAKEOFF, here, altitude, pitch))
     fastest = min(plan.vehicle.max_speed, vehicle.fastest)
     commanded = fastest if vehicle.hovers else float(route.speeds[0])
     items.append(_change_speed(commanded, axis))
@@ -80,13 +81,10 @@ def assemble(route: Route, plan: Plan) -> Mission:
 
 
 def _places(positions: Real, plan: Plan) -> list[tuple[float, float]]:
-    """Return `positions` (k, 2), m, in degrees."""
+    """Return `positions` (k, 2), m, in degrees, to 0.1 mm."""
     frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    latitudes, longitudes = frame.to_geodetic(positions)
-    return [
-        (round(float(x), _DECIMALS), round(float(y), _DECIMALS))
-        for x, y in zip(latitudes, longitudes, strict=True)
-    ]
+    latitudes, longitudes = (np.round(each, 9).tolist() for each in frame.to_geodetic(positions))
+    return list(zip(latitudes, longitudes, strict=True))
 
 
 def _finish(plan: Plan, place: tuple[float, float]) -> MissionItem:

@@ -16,13 +16,13 @@ from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, WORTHWHILE, Scheduler
+from faao_mav.schedule.waypoints import SHORTEST_HOVER
 from faao_mav.vector import lengths
 
 # The shortest wait at the first waypoint, s. After a hold of 1 s ArduCopter is still drifting and
 # leaves 0.4 to 0.75 s late, measured in its simulator.
 _FIRST_WAIT = 6.0
 
-_LAST_WAIT = 3.0  # the shortest wait at w_F while speeds are fitted, s, to come to rest there
 
 _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
 
@@ -38,8 +38,8 @@ class CopterScheduler(Scheduler):
         """Return `route` with the speeds and waits that fit best."""
         waits = route.waits.copy()
         waits[0] = max(waits[0], _FIRST_WAIT)
-        if route.last == len(waits) - 1:  # it ends at rest
-            waits[-1] = max(waits[-1], _LAST_WAIT)
+        if route.last == len(waits) - 1:  # it ends at rest, and takes that long to come to it
+            waits[-1] = max(waits[-1], SHORTEST_HOVER)
         return self.fitted(replace(route, waits=waits), self.max_speed)
 
     def refined(self, first: Schedule) -> Schedule:

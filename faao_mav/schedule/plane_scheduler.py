@@ -26,7 +26,6 @@ _MOVE_SHARE = 0.5
 _ROUNDS = 3  # times that waypoints are moved and speeds fitted, in turn; chosen
 # Where the plan's speed changes by more than this share, its legs are split so often, s; chosen.
 _CHANGE, _CHANGE_SPACING = 0.05, 5.0
-_SHORTEST_TIME = 1.5  # the least time from a new waypoint to the next one, s; chosen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +84,7 @@ class PlaneScheduler(Scheduler):
         for time in np.arange(self.t[0], self.t[-1], _CHANGE_SPACING).tolist():
             near = speed[np.abs(middle - time) <= reach]
             apart = np.abs(np.append(route.arrivals, times[-1:]) - time).min()
-            if len(near) and np.ptp(near) > _CHANGE * near.max() and apart > _SHORTEST_TIME:
+            if len(near) and np.ptp(near) > _CHANGE * near.max() and apart > _CHANGE_SPACING / 3:
                 times.append(time)
         return np.array(times)
 

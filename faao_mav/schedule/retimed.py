@@ -17,12 +17,12 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.autopilot.model import LegDurations
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
+from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vector import lengths
 
 _STRIDE = 3  # of so many samples of a predicted flight, 0.1 s apart, one is kept, for speed
 
 _REACHED = 1.03  # the largest ratio of a command and the speed flown for which it counts as reached
-_LEAST_PEAK = 0.1  # the least speed, m/s, that a leg is taken to reach
 
 # How far speeds are moved to see what they do, m/s: beyond the kinks of what legs come to. With
 # 0.15 to 0.4 schedules of 105 plans for ArduCopter are as good; with 0.01 fits end at kinks.
@@ -74,7 +74,7 @@ class Retimed:
 
         speed = lengths(flown.velocity[::_STRIDE])
         under_way = (self._t >= flown.departures[leg]) & (self._t < flown.arrivals[leg + 1])
-        peaks = np.full(len(route.speeds), _LEAST_PEAK)
+        peaks = np.full(len(route.speeds), SLOWEST)
         np.maximum.at(peaks, leg, speed * under_way)
         tops = route.speeds if known is None else known.flown(route.speeds)[0]
         self._peaks = np.where(tops > _REACHED * peaks, peaks, np.inf)

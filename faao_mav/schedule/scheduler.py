@@ -3,6 +3,7 @@
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
@@ -24,7 +25,6 @@ ALLOWED_ERROR = 0.8
 
 WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 
-_MOST_FLIGHTS = 5  # of a fit
 _LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
 
 _ALIKE = 0.1  # the relative difference of neighbours' speeds that are tried as one
@@ -82,7 +82,8 @@ class Scheduler(ABC):
         x = unknowns.initial
         best = self.flight(unknowns.commanded(x))
         cost = goal.cost(best)
-        for _ in range(_MOST_FLIGHTS - 1):
+        before = math.inf
+        while cost < (1 - _LEAST_GAIN) * before:
             tried, foreseen = stepped(goal, unknowns, self._retimed(best), x)
             if foreseen > (1 - _LEAST_GAIN) * cost:
                 break
@@ -94,8 +95,6 @@ class Scheduler(ABC):
             if now >= before:
                 break
             x, best, cost = tried, flown, now
-            if now > (1 - _LEAST_GAIN) * before:
-                break
         return best
 
     def _retimed(self, schedule: Schedule) -> Retimed:

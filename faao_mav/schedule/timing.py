@@ -22,7 +22,7 @@ MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the pl
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
 
 _SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
-_STEPS = 8  # the most steps with one flight retimed
+_STEPS = 8  # the most steps with one flight retimed: far from it the slopes are others
 _SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
 
 

@@ -23,7 +23,7 @@ SLOWEST = 0.1  # the least speed, m/s, that any autopilot is commanded: a slower
 # to 0.8 s later than predicted.
 _WIDEST_HOVER = 1.5
 
-_SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
+SHORTEST_HOVER = 3.0  # the shortest hover, s: a shorter stop is flown as slow flight
 
 # A plan that brakes as hard as it may swings past a hover and comes back, or backs up to leave it.
 # Reversals on legs of a metre or two took ArduCopter up to 0.9 s longer than predicted, measured in
@@ -60,7 +60,7 @@ def find_hovers(t: Real, w: Real, radius: float, slowest: float = SLOWEST) -> li
     [(0, 9)]
     """
     hovers: list[Waypoint] = []
-    for window in (_SPEED_WINDOW, _SHORTEST_HOVER):
+    for window in (_SPEED_WINDOW, SHORTEST_HOVER):
         slow = _speeds(t, w, window) < slowest
         hovers += [new for new in _boxed(t, w, slow, radius) if _is_apart(t, new, hovers)]
     return sorted(hovers, key=lambda hover: hover.first)
@@ -73,9 +73,9 @@ def _boxed(t: Real, w: Real, slow: Flags, radius: float) -> list[Waypoint]:
         first = begin
         while first < end:
             last = _last_within(w[first : end + 1], radius) + first
-            if t[last] - t[first] >= _SHORTEST_HOVER:
+            if t[last] - t[first] >= SHORTEST_HOVER:
                 hovers.append(Waypoint(first, last, _middle(w[first : last + 1], radius)))
-                first = int(np.searchsorted(t, t[last] + _SHORTEST_HOVER))
+                first = int(np.searchsorted(t, t[last] + SHORTEST_HOVER))
             else:
                 first += 1
     return hovers
@@ -83,7 +83,7 @@ def _boxed(t: Real, w: Real, slow: Flags, radius: float) -> list[Waypoint]:
 
 def _is_apart(t: Real, new: Waypoint, hovers: list[Waypoint]) -> bool:
     """Tell whether there are 3 s between the hover `new` and each of `hovers`."""
-    begin, end = t[new.first] - _SHORTEST_HOVER, t[new.last] + _SHORTEST_HOVER
+    begin, end = t[new.first] - SHORTEST_HOVER, t[new.last] + SHORTEST_HOVER
     return all(t[known.last] < begin or t[known.first] > end for known in hovers)
 
 
