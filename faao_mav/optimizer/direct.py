@@ -34,6 +34,7 @@ from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.multistart import EQUAL, improve_starts, paced
+from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
 from faao_mav.optimizer.search.starts import sparing_starts, starts
 from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
@@ -47,6 +48,9 @@ buffer need up to 300 steps."""
 _WIDTHS = (1.5, 0.5)
 """Decibels over which steps of a radio's own rates rise in the last searches. Chosen: of a step
 that is flown at, half of the last keeps the aircraft on it, 3 % of the distance."""
+
+_FOLLOWED = 2
+"""Starts over a map that are improved: the best as they are. Chosen."""
 
 _TOLLED_ITERATIONS = 40
 """Iterations of a flight under shadowing, at most. Chosen."""
@@ -84,21 +88,24 @@ def direct(
             return _worth(problem, flight.w, _designed(problem, scheme, flight.w))
         return objective(field.value(flight.w.T), kin, relay)
 
-    routes = _routes(problem, before, known, alone=alone)
+    routes = _routes(problem, before, known, field, alone=alone)
     tell(1, "the starts", 0.0)
     steps = problem.plan.optimizer.max_iterations * _LONG_SEARCH
     improved, going = dict(routes), list(routes)
-    if len(routes) > 1:  # a single start needs no comparison
+    if len(routes) > 1 and not problem.mapped:  # a single start needs no comparison
         improved, going = improve_starts(problem, field, routes, steps)
     strategy = WARM_START if len(routes) > 1 else None
     flights = [*routes.values(), *improved.values()]
     values = [value(flight) for flight in flights]
     best_yet = int(np.argmax(values))
     tell(2, "the best start", values[best_yet])
+    if problem.mapped:
+        going.sort(key=lambda name: value(routes[name]), reverse=True)
+        del going[_FOLLOWED:]
     starts = [improved[name] for name in going]
-    if best_yet < len(routes):  # no start was improved as far
+    if best_yet < len(routes) and not problem.mapped:  # no start was improved as far
         starts.append(flights[best_yet])
-    optima = [_maximized(problem, field, start, steps, strategy) for start in starts]
+    optima = [_followed(problem, field, start, steps, strategy) for start in starts]
     by_start = dict(zip(routes, values[len(routes) :], strict=True))
     by_start |= {name: value(end.trajectory) for name, end in zip(going, optima, strict=False)}
     best = _best(problem, field, optima)
@@ -135,17 +142,24 @@ def direct(
 
 
 def _routes(
-    problem: Problem, before: Solution | None, known: Trajectory | None, *, alone: bool
+    problem: Problem,
+    before: Solution | None,
+    known: Trajectory | None,
+    field: RateField,
+    *,
+    alone: bool,
 ) -> dict[str, Trajectory]:
     """Return the flights from which the search starts, by name.
 
-    They are those of `optimizer.starts`, `cutoff`, that of the plan for the cutoff rate `before`,
-    and `known`, that of a similar plan, or this `alone`.
+    They are those of `optimizer.starts`, over maps the straight one and `map`; `cutoff`, that of
+    the plan for the cutoff rate `before`; and `known`, that of a similar plan, or this `alone`.
     """
     kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
     stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
-    names = ("straight",) if alone else problem.plan.optimizer.starts
+    names = ("straight",) if alone or problem.mapped else problem.plan.optimizer.starts
     routes = starts(kin, names, stations, problem.free_area, fenced)
+    if problem.mapped and not alone:
+        routes |= starts_over_map(problem, field)
     if before is not None:
         routes["cutoff"] = before.trajectory
     if known is not None:
@@ -190,6 +204,19 @@ def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> Loc
     return max(equal, key=delivered)
 
 
+def _followed(
+    problem: Problem,
+    field: RateField,
+    start: Trajectory,
+    steps: int,
+    strategy: StartStrategy | None,
+) -> LocalOptimum:
+    """Return what is found from `start`: over maps close by, by the maps as they are."""
+    if problem.mapped:
+        return improved_over_map(problem, field, start)
+    return _maximized(problem, field, start, steps, strategy)
+
+
 def _maximized(
     problem: Problem,
     stage: Stage,
@@ -217,7 +244,9 @@ def _sharpened(
     found, now = [*optima], [*optima]
     for width in _WIDTHS:
         field = rate_field(problem, scheme, width)
-        now = [_maximized(problem, field, each.trajectory, max_iterations) for each in now]
+        now = [
+            _followed(problem, field, each.trajectory, max_iterations, WARM_START) for each in now
+        ]
         found += now
     flights = [each.trajectory.w for each in found]
     worth = [_worth(problem, w, _designed(problem, scheme, w)) for w in flights]
@@ -228,7 +257,7 @@ def _under_shadowing(problem: Problem, field: RateField, optimum: LocalOptimum) 
     """Return the best under shadowing of `optimum` and of those that stay less about one place."""
     begin = optimum.trajectory
     rates = partial(field.value, begin.w.T)
-    stages = [tolled(problem, field, begin.w, rates, z) for z in TOLLS]
+    stages = [tolled(problem, field.smoothed(), begin.w, rates, z) for z in TOLLS]
     found = [optimum, *(_maximized(problem, each, begin, _TOLLED_ITERATIONS) for each in stages)]
     flights = [each.trajectory.w for each in found]
     return found[int(np.argmax([worth(problem, w, partial(field.value, w.T)) for w in flights]))]

@@ -272,6 +272,11 @@ class Problem:
         return float(away.max()) + kin.max_speed * kin.time_step * (kin.slots - 1) / 2
 
     @property
+    def mapped(self) -> bool:
+        """Whether the gain of a link has a map."""
+        return any(link.gains.above is not None for link in self.links)
+
+    @property
     def links(self) -> tuple[Link, Link]:
         """BS to UAV, UAV to user."""
         return self.bs_uav, self.uav_user

@@ -55,6 +55,11 @@ class GainField:
         """Return the field with the places of the station in the slots `chosen` (k,) or ()."""
         return self if self.station.ndim == 1 else replace(self, station=self.station[chosen])
 
+    def smoothed(self) -> "GainField":
+        """Return the field with its map as the optimiser searches on it."""
+        smooth = self.above.smoothed() if isinstance(self.above, Grid) else self.above
+        return replace(self, above=smooth)
+
     def away(self, w: Real) -> Real:
         """Return w - p (2, ..., n) at positions w (2, ..., n), m."""
         return w - self.station.T.reshape(2, *[1] * (w.ndim - 2), -1)

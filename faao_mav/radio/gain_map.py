@@ -1,8 +1,8 @@
 """A map of a hop's gain: dB over a regular grid of east and north, at one height or several.
 
 It is the gain itself, or what the gain is above a law. Between the points of the grid a map is
-bilinear, between its heights linear: so flights are priced. The optimiser has the bicubic spline
-through the grid smoothed over a cell: slopes that it can follow, and no edge that it does not see.
+bilinear, between its heights linear: so flights are priced. The optimiser searches on a bicubic
+spline, which rounds its edges over a cell.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.spline import Spline
 
-_KERNEL = np.array([0.25, 0.5, 0.25])
-"""Weights of a point of the grid and its neighbours when a map is smoothed, along each side."""
+_B_SPLINE = np.array([1, 4, 1]) / 6
+"""The cubic B-spline at its own point of the grid and at those beside it."""
 
 _FARTHEST = 10_000.0
 """Metres between a map's own origin and the plan's at most: the meridians of both are parallel
@@ -146,11 +146,13 @@ class Grid:
         return np.asarray(most)
 
     def smoothed(self) -> Spline:
-        """Return the bicubic spline through the grid smoothed over a cell."""
-        padded = np.pad(self.values, 1, mode="edge")
-        along = sum(w * padded[k : k + len(self.x)] for k, w in enumerate(_KERNEL))
-        smooth = sum(w * along[:, k : k + len(self.y)] for k, w in enumerate(_KERNEL))
-        return Spline.through(self.x, self.y, np.asarray(smooth))
+        """Return the bicubic B-spline whose coefficients are the values: within their extremes."""
+        from scipy.ndimage import correlate1d  # with the optimiser, not before
+
+        smooth = self.values
+        for axis in (0, 1):
+            smooth = correlate1d(smooth, _B_SPLINE, axis, mode="nearest")
+        return Spline.through(self.x, self.y, smooth)
 
 
 def _located(grid: Real, x: Real) -> tuple[Integers, Real]:

@@ -7,12 +7,13 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design
-from faao_mav.optimizer.interior.rewards import StageValues
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 from faao_mav.radio.gain import PER_DB
+from faao_mav.radio.gain_field import GainField
 from faao_mav.radio.rate_steps import RateSteps
 
 
@@ -41,6 +42,44 @@ class RateField:
             value[j] = partials.value
             gradient[:, j], hessian[:, j] = at.by_position(partials)
         return StageValues(value, gradient, hessian)
+
+    def smoothed(self) -> "RateField":
+        """Return the rates over maps that are smooth: see `Grid.smoothed`."""
+        return self._of([link.gains.smoothed() for link in self.links])
+
+    def in_slot(self, slot: int) -> "RateField":
+        """Return the rates everywhere with the stations where they are in a `slot`."""
+        return self._of([link.gains.in_slots(slot) for link in self.links])
+
+    def _of(self, gains: Sequence[GainField]) -> "RateField":
+        """Return the rates with other `gains` of the links."""
+        pairs = zip(self.links, gains, strict=True)
+        return replace(self, links=tuple(replace(link, gains=each) for link, each in pairs))
+
+
+_PLACES = 16
+"""Places about each over which rates are blurred. Chosen: with 30 flights are no better."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blurred:
+    """The mean of a `stage` over places about each: Gaussian, of standard deviation `by`, m.
+
+    Edges of rates become slopes, as steep on either side.
+    """
+
+    stage: Stage
+    by: float
+
+    def __call__(self, w: Real) -> StageValues:
+        """Return rates, gradients and Hessians at positions w (2, ..., n), as `Stage` has them."""
+        k = np.arange(_PLACES)
+        away = self.by * np.sqrt(-2 * np.log(1 - (k + 0.5) / _PLACES))
+        turn = k * np.pi * (3 - np.sqrt(5))  # the golden angle: each is as far from the others
+        about = away * np.stack([np.cos(turn), np.sin(turn)])
+        about -= about.mean(axis=1, keepdims=True)
+        at = self.stage(w[:, None] + about.reshape(2, -1, *[1] * (w.ndim - 1)))
+        return StageValues(at.value.mean(axis=1), at.gradient.mean(axis=2), at.hessian.mean(axis=2))
 
 
 _LEAST_WIDTH = 4.0

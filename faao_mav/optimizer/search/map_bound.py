@@ -87,7 +87,7 @@ class MapBound:
     @classmethod
     def over(cls, problem: Problem, rates: BestRates, cells: int, reach: float) -> "MapBound":
         """Return the bound of `problem` over about so many cells, and steps of `reach` cells."""
-        places = np.vstack([_about(problem, link) for link in problem.links])
+        places = np.vstack([places_about(problem, link) for link in problem.links])
         kin, free = problem.kinematics, problem.free_area
         return cls(problem, rates, cells_of(kin, places, cells, reach, free))
 
@@ -95,23 +95,29 @@ class MapBound:
     def _rates(self) -> dict[int, Real]:
         """Rates of both links (2, parts, velocities, i, j) in runs of slots, bits.
 
-        By the number of the run where each has rates of its own, else by its length. In the first
-        case the velocities are one, which stands for all. The slots of a run are added up, to one
-        part, unless they are shared (half duplex).
+        By their `_keys`. With known draws the velocities are one, which stands for all. The slots
+        of a run are added up, to one part, unless they are shared (half duplex).
         """
-        runs = enumerate(self.cells.blocks)
-        found = {(k if self._each else len(run)): k for k, run in runs}
-        return {key: self._of_run(k) for key, k in found.items()}
+        return {key: self._of_run(self._keys.index(key)) for key in set(self._keys)}
+
+    @cached_property
+    def _keys(self) -> list[int]:
+        """Numbers of the runs, the same for those that have the same rates."""
+        moves = any(link.gains.station.ndim > 1 for link in self.problem.links)
+        own = moves or self.rates.known
+        return [k if own else len(run) for k, run in enumerate(self.cells.blocks)]
 
     def _of_run(self, k: int) -> Real:
+        known, moves = self.rates.known, len(set(self._keys)) == len(self._keys)
         kin, cells = self.problem.kinematics, self.cells
         most, slots = kin.max_speed, cells.blocks[k]
         along = np.arange(-_DIRECTIONS, _DIRECTIONS + 1) * most / _DIRECTIONS
         velocities = np.stack(np.meshgrid(along, along), axis=-1).reshape(-1, 2)
         gap = most / _DIRECTIONS * CORNER
         velocities = velocities[np.hypot(*velocities.T) <= most + gap]
-        velocities = velocities[len(velocities) // 2 :]  # a run backwards has the same rates
-        if self._each or len(slots) == 1:
+        if not moves:  # a run backwards has the same rates
+            velocities = velocities[len(velocities) // 2 :]
+        if known or len(slots) == 1:
             velocities, gap = np.zeros((1, 2)), most
         parts = len(slots) if self._half else 1
         found = np.zeros((2, parts, len(velocities), *cells.x.shape[1:]))
@@ -124,12 +130,6 @@ class MapBound:
                 gain = most_gain(link.gains.in_slots(slot), places, off)
                 found[j, number % parts] += self.rates.at(j, slot, gain)
         return found
-
-    @property
-    def _each(self) -> bool:
-        """Whether each run of slots has rates of its own: of known draws, of stations that move."""
-        moving = any(link.gains.station.ndim > 1 for link in self.problem.links)
-        return self.rates.known or moving
 
     @property
     def _half(self) -> bool:
@@ -147,8 +147,7 @@ class MapBound:
             both = p * received, (1 - p) * forwarded
             total = np.maximum(*both) if self._half else both[0] + both[1]
             worth[key] = total.sum(axis=1).max(axis=1)
-        runs = self.cells.blocks
-        rewards = np.stack([worth[k if self._each else len(run)] for k, run in enumerate(runs)])
+        rewards = np.stack([worth[key] for key in self._keys])
         rewards = np.where(self.cells.alive[:, None], rewards, -np.inf)
         ends = np.array([at_ends(self.problem, self.rates, price) for price in p.ravel().tolist()])
         through = self.cells.through(rewards) + ends[:, None, None]
@@ -156,7 +155,7 @@ class MapBound:
         return float(best) / self.problem.kinematics.slots
 
 
-def _about(problem: Problem, link: Link) -> Real:
+def places_about(problem: Problem, link: Link) -> Real:
     """Return places (k, 2), m: beyond a box about them and the ends the gain only falls outwards.
 
     They are the station, as far about it as the gain by its law rises with the distance, and the
@@ -212,6 +211,7 @@ def map_bound(problem: Problem, rates: BestRates, *, cells: int | None = None) -
     is tighter; it takes as many times longer.
     """
     if cells is None:
-        cells = _FINE_CELLS if problem.free_area is None else _FENCED_CELLS
+        finer = problem.mapped or problem.free_area is not None
+        cells = _FENCED_CELLS if finer else _FINE_CELLS
     price = best_price(MapBound.over(problem, rates, _COARSE_CELLS, _COARSE_REACH).bound)
     return MapBound.over(problem, rates, cells, _REACH).bound([price + off for off in _APART])

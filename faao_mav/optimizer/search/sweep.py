@@ -71,16 +71,18 @@ class Cells:
             return np.nan_to_num(after + before - rewards, nan=-np.inf, neginf=-np.inf)
 
 
-def disc(step: float) -> list[tuple[int, int]]:
+def disc(step: float, beyond: int = 1) -> list[tuple[int, int]]:
     """Return rows to either side, and columns there, from any point of a cell `step` sides away.
+
+    With 0 `beyond` they are from centre to centre.
 
     >>> disc(1.5)
     [(0, 2), (1, 2), (2, 2)]
     """
     return [
-        (row, int(np.sqrt(step**2 - max(0, row - 1) ** 2)) + 1)
+        (row, int(np.sqrt(step**2 - max(0, row - beyond) ** 2)) + beyond)
         for row in range(int(step) + 2)
-        if row - 1 <= step
+        if row - beyond <= step
     ]
 
 
