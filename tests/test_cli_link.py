@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SMALL, edited
 from flight_logs import dataflash, heard, tlog, ulog
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.geodesy import LocalFrame
+from faao_mav.optimizer.problem import build_problem
+from faao_mav.plan import read_plan
 from faao_mav.plan.yaml_text import load_yaml
 from faao_mav.validate.flown import FlightRecord
 
@@ -94,6 +97,87 @@ def test_where_no_law_holds_nothing_is_written(tmp_path: Path) -> None:
     assert not out.exists()
     told = json.loads(link(path, "--station", PLACE, "--out", out, "--json", status=1))
     assert (told["holds"], told["written"]) == (False, [])
+
+
+def test_what_the_law_leaves_is_a_map_above_it(tmp_path: Path) -> None:
+    """Shadowing that depends on the place alone; the plan names the law, and that names the map."""
+    flight = record(60.0, spread=0.0)
+    x, y = LocalFrame(*STATION[:2]).to_local(flight.latitude, flight.longitude).T
+    shadow = 6.0 * np.sin(x / 60) * np.cos(y / 70)
+    path = table(tmp_path, replace(flight, rssi=flight.rssi + np.round(1.9 * shadow)))
+    (tmp_path / "maps").mkdir()
+    out, found = tmp_path / "link.yaml", tmp_path / "maps" / "m.npz"
+    given = (path, "--station", PLACE, "--power", 20, "--out", out, "--map", found)
+    text = " ".join(link(*given).split())
+    assert "dB at legs left out one by one," in text
+    assert f"files {out}, {found}" in text
+    told = json.loads(link(*given, "--json"))
+    assert told["left_out_map_db"] < 0.8 * told["left_out_db"]
+    assert load_yaml(out.read_text(), "link.yaml")["map"] == "maps/m.npz"
+    plan = small_plan(tmp_path, {"latitude": STATION[0], "longitude": STATION[1], "elevation": 99})
+    above = build_problem(read_plan(plan)).bs_uav.gains.above
+    assert above is not None
+    seen = np.hypot(x, y) < 120
+    off = above.value(x[seen], y[seen]) - (shadow[seen] - shadow[seen].mean())
+    assert np.std(off) < 2.0
+
+
+def small_plan(folder: Path, origin: dict[str, float]) -> Path:
+    """Write a plan whose gain is link.yaml, about an origin."""
+    changes = {"radio.gain": "link.yaml", "site.origin": origin, "flight.altitude": 60}
+    path = folder / "plan.yaml"
+    path.write_text(edited(SMALL, changes))
+    return path
+
+
+def test_terrain_tells_free_space_and_what_it_takes(tmp_path: Path) -> None:
+    tile = tmp_path / "S36E149.hgt"
+    east = np.arange(1201) / 1200 + 149 - STATION[1]
+    row = 580 + 80 * np.exp(-(((east * 90_900 - 400) / 120) ** 2))
+    tile.write_bytes(np.broadcast_to(np.round(row), (1201, 1201)).astype(">i2").tobytes())
+    out = tmp_path / "link.yaml"
+    given = ("--terrain", tile, "--station", PLACE, "--frequency", 2400, "--heights", "60,90",
+             "--radius", 800, "--spacing", 40, "--out", out)  # fmt: skip
+    text = " ".join(link(*given).split())
+    assert "gain -40.1 - 20 log10 d dB, in free space" in text
+    assert "41 x 41 points by 40 m, 60, 90 m above that ground" in text
+    told = json.loads(link(*given, "--json"))
+    assert told["origin"] == [*STATION[:2], pytest.approx(580, abs=1)]
+    assert told["written"] == [str(out), str(tmp_path / "link.npz")]
+    assert 30 < told["most_loss_db"][0] < 60
+    plan = read_plan(small_plan(tmp_path, dict(zip(ORIGIN, (*STATION[:2], 570), strict=True))))
+    found = plan.radio.gain.map
+    assert found is not None
+    assert found.heights == pytest.approx([70, 100], abs=1)  # above the plan's origin
+    gains = build_problem(plan).bs_uav.gains
+    near, behind = 10 * np.log10(gains.gain(np.array([[-300.0, 700.0], [0.0, 0.0]])))
+    assert near == pytest.approx(-40.05 - 20 * np.log10(np.hypot(300, 60)), abs=0.1)
+    assert behind < -40.05 - 20 * np.log10(700) - 15
+
+
+ORIGIN = ("latitude", "longitude", "elevation")
+FLAT = ("--terrain", "N47E008.hgt", "--station", PLACE)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--station", PLACE], "expected LOG..., flights that were measured, or --terrain DEM"),
+        (["x.csv", *FLAT], "expected LOG..., flights that were measured, or --terrain DEM"),
+        ([*FLAT], "--frequency: expected MHz, 30 to 100000, for --terrain"),
+        ([*FLAT, "--frequency", "2.4"], "--frequency: expected MHz, 30 to 100000"),
+        ([*FLAT, "--frequency", "900", "--heights", "60,40"], "--heights 60,40: expected metres"),
+        ([*FLAT, "--frequency", "900", "--heights", "60,x"], "--heights 60,x: expected metres"),
+        ([*FLAT, "--frequency", "900"], "N47E008.hgt: cannot be read"),
+        ([*FLAT, "--map", "m.npz"], "--map: give --out, the file that names it"),
+        (
+            [*FLAT, "--map", "m.csv", "--out", "a.yaml"],
+            "--map m.csv: give a name",
+        ),
+    ],
+)
+def test_unusable_arguments_of_maps_are_told(arguments: list[str], message: str) -> None:
+    assert message in " ".join(link(*arguments, status=2).split())
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
-"""`faao-mission link LOG... --station LAT,LON,HEIGHT --out link.yaml`: a link fitted to logs."""
+"""`faao-mission link`: a link fitted to logs, or what terrain leaves of free space."""
 
+import json
+import os
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,28 +18,34 @@ from faao_mav.cli.shared import (
     exit_status,
     note,
     option,
+    progress,
     read_numbers,
     show,
 )
 from faao_mav.errors import InputError
-from faao_mav.files import check_ending, read_text, write_whole
+from faao_mav.files import check_ending, read_text, write_together, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
+    from faao_mav.radio.gain_map import GainMap
     from faao_mav.radio.measured import Calibration
 
 
 @exit_status()
 def link(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="LOG...", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
+    station: Annotated[
+        str,
+        option(
+            "LAT,LON,HEIGHT",
+            "The station's antenna: degrees, and m as the altitudes, over terrain m above ground.",
         ),
     ],
-    station: Annotated[
-        str, option("LAT,LON,HEIGHT", "The station's antenna: degrees, and m as the altitudes.")
-    ],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[LOG...]", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
+        ),
+    ] = None,
     out: Annotated[File, option("LINK.yaml", "What to write: a plan's radio.gain.")] = None,
     power: Annotated[Number, option("DBM", "What was sent, dBm; without: shape only.")] = None,
     noise: Annotated[Number, option("DBM", "Noise of the receiver, dBm: for snr.")] = None,
@@ -52,15 +61,41 @@ def link(
     mean: Annotated[
         float, option("S", "Time over which levels are averaged, s.", min=0.1, max=60.0)
     ] = 2.0,
+    map_file: Annotated[
+        File, option("MAP.npz", "What the law leaves of the logs, as a map above it.", "--map")
+    ] = None,
+    terrain: Annotated[
+        list[Path] | None,
+        option(
+            "DEM", "No log: heights, .hgt or GeoTIFF; may be repeated. The map is beside --out."
+        ),
+    ] = None,
+    frequency: Annotated[Number, option("MHZ", "Over terrain: the frequency.")] = None,
+    clutter: Annotated[
+        float, option("M", "Over terrain: the height of woods and houses.", min=0.0, max=200.0)
+    ] = 0.0,
+    heights: Annotated[
+        str, option("M,M", "Over terrain: heights of the map above the station's ground.")
+    ] = "40,60,80,100,120",
+    radius: Annotated[
+        float, option("M", "Over terrain: how far the map goes.", min=10.0, max=50_000.0)
+    ] = 1000.0,
+    spacing: Annotated[
+        float, option("M", "Over terrain: steps of the map.", min=1.0, max=1000.0)
+    ] = 20.0,
     report: Annotated[File, option("PAGE.html", "Measured against fitted, on one page.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Fit the law of a link's path gain to what was measured in flight.
+    """Fit the law of a link's path gain to what was measured in flight, or to terrain.
 
     From tables (CSV) with time, latitude, longitude, altitude and one of rsrp, rssi, snr,
     throughput; or from logs with what a telemetry radio counts, where heights are above home.
     HEIGHT of the station is above the same. The law has as many terms over the elevation as pay
-    when whole legs and heights are left out of the fit; what it leaves is told as its spread.
+    when whole legs and heights are left out of the fit; what it leaves is told as its spread, and
+    by --map as a map above the law, kriged, where that tells legs that were left out better.
+
+    With --terrain and --frequency: free space, and above it a map of minus the diffraction loss by
+    ITU-R P.526, Bullington's construction. Its origin is the station's ground, which --out names.
 
     Exit status: 0 fitted; 1 no law holds, nothing is written but the page; 2 unusable arguments or
     input.
@@ -81,17 +116,32 @@ def link(
     ]
     if len(points) > 2 or len({count for count, *_ in points}) < len(points):
         raise InputError("--calibrate: expected one or two different counts")
-    inputs: dict[str, Path | None] = {"--rates": rates, **{f"LOG {path}": path for path in logs}}
+    inputs: dict[str, Path | None] = {
+        "--rates": rates,
+        **{f"LOG {path}": path for path in logs or ()},
+    }
     if out is not None:
         check_ending(out, "--out", (".yaml", ".yml"))
-    check_outputs({"--out": out, "--report": report}, inputs)
+        map_file = map_file or (out.with_suffix(".npz") if terrain else None)
+    if map_file is not None:
+        check_ending(map_file, "--map", (".npz",))
+        if out is None:
+            raise InputError("--map: give --out, the file that names it")
+    inputs |= {f"--terrain {path}": path for path in terrain or ()}
+    check_outputs({"--out": out, "--map": map_file, "--report": report}, inputs)
+    if bool(logs) == bool(terrain):
+        raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
+    if terrain:
+        size = clutter, radius, spacing
+        _over_terrain(terrain, place, frequency, heights, size, out, map_file, as_json)
+        return
     from faao_mav.radio.fit import fit_link
-    from faao_mav.report.link import link_lines, link_page, link_record, link_yaml
+    from faao_mav.report.link import link_lines, link_page, link_record, link_yaml, map_text
     from faao_mav.report.summary import joined
 
     sent = power or 0.0
     flights: list[Samples] = []
-    for path in logs:
+    for path in logs or ():
         for samples, told in _flights(path, place, units, points):
             if told == "mbit/s":
                 samples, told = _by_rates(path, samples, rates), "db"
@@ -103,14 +153,75 @@ def link(
     fit = fit_link(flights, mean)
     if report is not None:
         write_whole(report, link_page(fit, absolute).encode())
-    if out is not None and fit.holds:
-        write_whole(out, link_yaml(fit, absolute).encode())
-    written = [str(each) for each in (out if fit.holds else None, report) if each is not None]
-    lines = [*link_lines(fit, absolute), ("files", ", ".join(written) or "none")]
-    record = link_record(fit, absolute) | {"written": written}
-    show(lambda: record, lambda: [joined(lines)], as_json=as_json)
+    lines, record = [*link_lines(fit, absolute)], link_record(fit, absolute)
+    found = None
+    if map_file is not None and fit.holds:
+        from faao_mav.radio.kriging import kriged
+
+        found, alone, error = kriged(fit, place)
+        fit = replace(fit, spread=fit.spread if found is None else error)
+        lines.append(("map", map_text(found, alone, error)))
+        record |= {"left_out_db": alone, "left_out_map_db": error}
+    written = [str(report)] if report is not None else []
+    if fit.holds:
+        written = [*_written(link_yaml(fit, absolute), out, found, map_file), *written]
+    show(
+        lambda: record | {"written": written},
+        lambda: [joined([*lines, ("files", ", ".join(written) or "none")])],
+        as_json=as_json,
+    )
     if not fit.holds:
         raise typer.Exit(1)
+
+
+def _written(text: str, out: Path | None, found: "GainMap | None", map_file: File) -> list[str]:
+    """Write the law `text`, which names its map, and that; return their names."""
+    from faao_mav.radio.map_file import map_archive
+
+    if out is None:
+        return []
+    if found is None or map_file is None:
+        write_whole(out, text.encode())
+        return [str(out)]
+    name = json.dumps(os.path.relpath(map_file, out.parent))
+    write_together({map_file: map_archive(found), out: f"{text}map: {name}\n".encode()})
+    return [str(out), str(map_file)]
+
+
+def _over_terrain(
+    paths: Sequence[Path],
+    station: Sequence[float],
+    frequency: float | None,
+    heights: str,
+    size: tuple[float, float, float],
+    out: Path | None,
+    map_file: Path | None,
+    as_json: bool,
+) -> None:
+    """Write and tell free space, and the map of what terrain takes above it."""
+    if frequency is None or not 30 <= frequency <= 100_000:
+        raise InputError("--frequency: expected MHz, 30 to 100000, for --terrain")
+    wanted = f"--heights {heights}: expected metres that rise, as 40,60,80"
+    levels = read_numbers(heights, heights.count(",") + 1, wanted)
+    if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= 20_000:
+        raise InputError(wanted)
+    from faao_mav.radio.terrain import read_terrain, terrain_map
+    from faao_mav.report.link import terrain_lines, terrain_record, terrain_yaml
+    from faao_mav.report.summary import joined
+
+    rasters = []
+    for path in paths:
+        raster, unknown = read_terrain(path)
+        rasters.append(raster)
+        if unknown:
+            note(f"{path}: {unknown:,} heights are not known and taken from the nearest that are")
+    with progress(shown=sys.stderr.isatty()) as observe:
+        found = terrain_map(rasters, station, 1e6 * frequency, levels, *size, observe)
+    names = ", ".join(path.name for path in paths)
+    written = _written(terrain_yaml(frequency, names), out, found, map_file)
+    lines = [*terrain_lines(found, frequency), ("files", ", ".join(written) or "none")]
+    record = terrain_record(found, frequency) | {"written": written}
+    show(lambda: record, lambda: [joined(lines)], as_json=as_json)
 
 
 def _flights(

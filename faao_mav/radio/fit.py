@@ -193,7 +193,7 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
         raise InputError(f"{_sources(means)}: {text}")
     if np.ptp(place, axis=0).max() < 1.0:
         raise InputError(f"{_sources(means)}: one place alone; expected a flight")
-    legs = _legs(means)
+    legs = legs_of(means)
     heights = _heights(place[:, 2], legs)
     parts = [part for part in (legs, heights) if part.max() > 0]
 
@@ -286,7 +286,7 @@ def _wild(A: Real, y: Real, law: tuple[bool, int]) -> bool:
     return terms > 0 and float(np.ptp(s @ _robust(A, y)[-terms:])) > _SWING
 
 
-def _legs(means: Sequence[Samples]) -> Integers:
+def legs_of(means: Sequence[Samples]) -> Integers:
     """Return the number of each mean's leg, (k,): a flight's stretch without a turn."""
     numbers, leg = list[int](), -1
     least = max(_LEAST, sum(len(flight.t) for flight in means) // _MOST_LEGS)

@@ -80,9 +80,7 @@ class GainMap:
 
         What is not known there is as at the nearest point that is.
         """
-        db = self._between(height)
-        if np.isnan(db).any():
-            db = _filled(db)
+        db = filled(self._between(height))
         if not self.above_law:
             return Grid(self.east, self.north, db.T)
         x, y = (_widened(side) for side in (self.east, self.north))
@@ -168,8 +166,10 @@ def _widened(side: Real) -> Real:
     return np.concatenate([[side[0] - step], side, [side[-1] + step]])
 
 
-def _filled(db: Real) -> Real:
+def filled(db: Real) -> Real:
     """Return `db` (m, k) with the nearest known value where it is NaN."""
+    if not np.isnan(db).any():
+        return db
     from scipy.ndimage import distance_transform_edt
 
     nearest = distance_transform_edt(np.isnan(db), return_distances=False, return_indices=True)

@@ -35,6 +35,15 @@ class Raster:
     cell: Callable[[Real, Real], tuple[Real, Real]]
     place: Callable[[Real, Real], tuple[Real, Real]]
 
+    @property
+    def step(self) -> float:
+        """Metres from middle to middle, along rows or columns, whichever are less."""
+        rows, columns = np.array(self.values.shape) / 2 - 0.5
+        at = rows + np.array([0.0, 1.0, 0.0]), columns + np.array([0.0, 0.0, 1.0])
+        longitude, latitude = self.place(*at)
+        local = LocalFrame(latitude[0], longitude[0]).to_local(latitude, longitude)
+        return float(np.hypot(*local[1:].T).min())
+
     def at(self, latitude: Real, longitude: Real) -> Real:
         """Return the values at places (...), bilinear between middles; NaN off the raster."""
         from scipy.ndimage import map_coordinates

@@ -9,6 +9,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, seen
+from faao_mav.radio.gain_map import GainMap
+from faao_mav.radio.terrain import free_space_db
 from faao_mav.report.style import INK, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.report.summary import Line
 from faao_mav.validate.words import counted
@@ -106,6 +108,54 @@ def link_yaml(fit: LinkFit, absolute: bool) -> str:
         f"spread_db: {fit.spread:.2f}\ncorrelation_m: {fit.correlation:.0f}\n"
         f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
     )
+
+
+def map_text(found: GainMap | None, alone: float, error: float) -> str:
+    """Return what a map above the law brings: errors at legs left out, dB, without it and with."""
+    if found is None:
+        return f"none: no map tells legs that are left out better than the law, {alone:.1f} dB"
+    told = f"{error:.1f} dB at legs left out one by one, {alone:.1f} by the law alone"
+    return f"{told}; {_extent(found)} of the station's antenna"
+
+
+def _extent(found: GainMap) -> str:
+    up = ", ".join(f"{height:g}" for height in found.heights)
+    step = found.east[1] - found.east[0]
+    return f"{len(found.east)} x {len(found.north)} points by {step:.3g} m, {up} m above that"
+
+
+def terrain_lines(found: GainMap, frequency: float) -> Iterator[Line]:
+    """Yield free space at a `frequency`, MHz, and the map of what terrain takes."""
+    yield "gain", f"{free_space_db(1e6 * frequency):.1f} - 20 log10 d dB, in free space"
+    assert found.ground is not None
+    low, high = found.ground.min(), found.ground.max()
+    yield "ground", f"{low:.0f} to {high:.0f} m above the station's, at {found.origin[2]:.0f} m"
+    yield "map", f"{_extent(found)} ground"
+    for height, loss in zip(found.heights, -found.db, strict=True):
+        known = loss[~np.isnan(loss)]
+        told = f"{np.median(known):.1f} dB lost in the median, at most {known.max():.1f}"
+        lost = f"{np.mean(np.isnan(loss)):.0%} below ground"
+        yield f"at {height:g} m", f"{told}; {lost}" if len(known) else lost
+
+
+def terrain_record(found: GainMap, frequency: float) -> dict[str, Any]:
+    """Return the JSON object of `--json`; losses are null where a height is below ground."""
+    losses = [-each[~np.isnan(each)] for each in found.db]
+    return {
+        "reference_gain_db": free_space_db(1e6 * frequency),
+        "exponent": 2.0,
+        "origin": found.origin,
+        "heights_m": found.heights.tolist(),
+        "median_loss_db": [float(np.median(each)) if len(each) else None for each in losses],
+        "most_loss_db": [float(each.max()) if len(each) else None for each in losses],
+    }
+
+
+def terrain_yaml(frequency: float, names: str) -> str:
+    """Return the file that a plan's `gain` names, but for its map."""
+    about = f"free space at {frequency:g} MHz, diffraction by ITU-R P.526 over {names}"
+    level = free_space_db(1e6 * frequency)
+    return f"about: {json.dumps(about)}\nreference_gain_db: {level:.2f}\nexponent: 2\n"
 
 
 def _rests_on(fit: LinkFit) -> str:
