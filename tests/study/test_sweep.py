@@ -68,7 +68,7 @@ def test_values_are_those_of_yaml() -> None:
         ("radio.modulation", "key=start:stop:step"),
         ("radio.modulaton=qpsk", "did you mean radio.modulation?"),
         ("modulation=qpsk", "did you mean radio.modulation?"),
-        ("radio=1", "a section cannot be varied; give one of radio.base_station.position"),
+        ("radio=1", "a section cannot be varied; give one of radio.base_station."),
         ("name=a,b", "unknown key"),
         ("study.seeds=1", "unknown key"),
         ("flight.duration=", "neither"),
