@@ -98,8 +98,12 @@ class Document:
 
     def shown(self, path: Path) -> str:
         """Return the value at `path` as one line of YAML; nothing where there is none."""
-        value = self.value(path)
-        return "" if value is None else _one_line(value)
+        if (value := self.value(path)) is None:
+            return ""
+        yaml, text = YAML(), io.StringIO()
+        yaml.default_flow_style, yaml.width = True, _WIDTH
+        yaml.dump({"k": value}, text)
+        return text.getvalue().strip()[len("{k: ") : -1]
 
     def write(self, path: Path, text: str) -> None:
         """Put the value that `text` has in YAML at `path`; nothing stands for no value.
@@ -224,10 +228,3 @@ def _flow(value: object) -> object:
         return value
     held.fa.set_flow_style()
     return held
-
-
-def _one_line(value: object) -> str:
-    yaml, text = YAML(), io.StringIO()
-    yaml.default_flow_style, yaml.width = True, _WIDTH
-    yaml.dump({"k": value}, text)
-    return text.getvalue().strip()[len("{k: ") : -1]

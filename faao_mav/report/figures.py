@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.optimizer.shadowing import Shadowed, arriving
 from faao_mav.optimizer.solution import Solution
@@ -148,8 +148,9 @@ def precoder_power(solution: Solution) -> "Figure":
         ("base station", solution.P_B, "W_B", radio.base_station.power),
         ("UAV", solution.P_U, "W_U", radio.relay.power),
     ):
-        streams = enumerate(_stream_powers(P).T, 1)
-        curves = {f"stream {k}": (solution.t, stream) for k, stream in streams}
+        found = np.sort(np.sum(np.abs(P) ** 2, axis=-2), axis=-1)[..., ::-1]
+        streams = found.mean(axis=0) if found.ndim == 3 else found  # (n, streams), W
+        curves = {f"stream {k}": (solution.t, each) for k, each in enumerate(streams.T, 1)}
         plots.append(_Plot(f"{station}, W", curves, {limit: power}))
     figure = _figure(*plots)
     for axes in figure.axes:
@@ -258,9 +259,3 @@ def _draw(column: "list[Axes]", *plots: _Plot) -> None:
         axes.tick_params(labelbottom=last)
         if ("" not in plot.curves or plot.limits) and len(plot.curves) <= len(SERIES):
             legend_above(axes)
-
-
-def _stream_powers(P: Complex) -> Real:
-    """Return (n, streams), W, the strongest first."""
-    power = np.sort(np.sum(np.abs(P) ** 2, axis=-2), axis=-1)[..., ::-1]
-    return np.asarray(power.mean(axis=0) if power.ndim == 3 else power)

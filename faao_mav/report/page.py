@@ -45,6 +45,10 @@ def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
 def page(title: str, content: str) -> str:
     """Return a whole page of sections, offline, for light, dark, phone and paper."""
     title = escape(title)
+    made_by = [
+        *(f"{name} {version(name)}" for name in _PARTS),
+        f"Python {platform.python_version()}",
+    ]
     style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
     return f"""<!doctype html>
 <html lang="en">
@@ -61,7 +65,7 @@ def page(title: str, content: str) -> str:
 <main>
 {content}
 </main>
-<footer>{escape(_versions())}</footer>
+<footer>{escape(", ".join(made_by))}</footer>
 </body>
 </html>
 """
@@ -184,8 +188,3 @@ def _table(head: tuple[str, str], rows: Sequence[tuple[str, str]]) -> str:
 
     body = "".join(cells("td", row) for row in rows)
     return f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>"
-
-
-def _versions() -> str:
-    parts = [f"{name} {version(name)}" for name in _PARTS]
-    return ", ".join([*parts, f"Python {platform.python_version()}"])
