@@ -285,9 +285,9 @@ class Model:
             more = [relayed.received, relayed.forwarded, relayed.queue]
             more.append(np.ones(n) if shares is None else shares)
         if self.fence is not None and len(self.fence.obstacles):
-            ends = start.w.T[:, None]
-            u, _ = self.fence.obstacles.separation(ends[..., :-1], ends[..., 1:])
-            more.append(np.arctan2(u[1, :, 0], u[0, :, 0]).ravel(order="F"))
+            ends = start.w.T
+            u, _ = self.fence.obstacles.separation(ends[:, :-1], ends[:, 1:])
+            more.append(np.arctan2(u[1], u[0]).ravel(order="F"))
         x0 = np.concatenate(
             [
                 (start.w / LENGTH).ravel(),

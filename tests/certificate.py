@@ -94,8 +94,7 @@ def _apart(
     room, limits = fence.room(kin), []
     obstacles = fence.obstacles
     if len(obstacles):
-        u, h = obstacles.separation(w.T[:, None, :-1], w.T[:, None, 1:])
-        u, h = u[:, :, 0], h[:, 0]
+        u, h = obstacles.separation(w.T[:, :-1], w.T[:, 1:])
         left = np.minimum(*(np.einsum("cpn,nc->pn", u, end) for end in (w[:-1], w[1:]))) - h - room
         piece, slot = np.nonzero(left < _NEAR * reach)
         if piece.size:

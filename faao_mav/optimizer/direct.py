@@ -28,7 +28,6 @@ from faao_mav.optimizer.interior.maximize import (
     objective,
 )
 from faao_mav.optimizer.interior.rewards import Stage
-from faao_mav.optimizer.interior.search import WARM_START, StartStrategy
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
@@ -94,7 +93,6 @@ def direct(
     improved, going = dict(routes), list(routes)
     if len(routes) > 1 and not problem.mapped:  # a single start needs no comparison
         improved, going = improve_starts(problem, field, routes, steps)
-    strategy = WARM_START if len(routes) > 1 else None
     flights = [*routes.values(), *improved.values()]
     values = [value(flight) for flight in flights]
     best_yet = int(np.argmax(values))
@@ -105,7 +103,8 @@ def direct(
     starts = [improved[name] for name in going]
     if best_yet < len(routes) and not problem.mapped:  # no start was improved as far
         starts.append(flights[best_yet])
-    optima = [_followed(problem, field, start, steps, strategy) for start in starts]
+    warm = len(routes) > 1
+    optima = [_followed(problem, field, start, steps, warm=warm) for start in starts]
     by_start = dict(zip(routes, values[len(routes) :], strict=True))
     by_start |= {name: value(end.trajectory) for name, end in zip(going, optima, strict=False)}
     best = _best(problem, field, optima)
@@ -209,12 +208,13 @@ def _followed(
     field: RateField,
     start: Trajectory,
     steps: int,
-    strategy: StartStrategy | None,
+    *,
+    warm: bool = True,
 ) -> LocalOptimum:
     """Return what is found from `start`: over maps close by, by the maps as they are."""
     if problem.mapped:
         return improved_over_map(problem, field, start)
-    return _maximized(problem, field, start, steps, strategy)
+    return _maximized(problem, field, start, steps, warm=warm)
 
 
 def _maximized(
@@ -222,9 +222,10 @@ def _maximized(
     stage: Stage,
     start: Trajectory,
     max_iterations: int,
-    strategy: StartStrategy | None = WARM_START,
+    *,
+    warm: bool = True,
 ) -> LocalOptimum:
-    """Return what is found from `start`, without another strategy near an optimum."""
+    """Return what is found from `start`, which is nearly optimal where `warm`."""
     return maximize(
         problem.kinematics,
         stage,
@@ -232,7 +233,7 @@ def _maximized(
         constraints=problem.constraints(problem.kinematics),
         tolerance=problem.plan.optimizer.tolerance,
         max_iterations=max_iterations,
-        strategy=strategy,
+        warm=warm,
         relay=problem.maximised_queue,
     )
 
@@ -244,9 +245,7 @@ def _sharpened(
     found, now = [*optima], [*optima]
     for width in _WIDTHS:
         field = rate_field(problem, scheme, width)
-        now = [
-            _followed(problem, field, each.trajectory, max_iterations, WARM_START) for each in now
-        ]
+        now = [_followed(problem, field, each.trajectory, max_iterations) for each in now]
         found += now
     flights = [each.trajectory.w for each in found]
     worth = [_worth(problem, w, _designed(problem, scheme, w)) for w in flights]

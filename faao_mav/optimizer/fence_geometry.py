@@ -51,14 +51,14 @@ class FenceGeometry:
         samples.
         """
         least = np.inf
-        w, v, a = (x[:, None] for x in (flight.w.T, flight.v.T, flight.a.T))
+        w, v, a = flight.w.T, flight.v.T, flight.a.T
         if len(self.obstacles):
-            u, h = self.obstacles.separation(w[..., :-1], w[..., 1:])
+            u, h = self.obstacles.separation(w[:, :-1], w[:, 1:])
             nearest = _least_along(u, w, v, a, time_step) - h
             least = min(least, float(nearest.min()))
         if len(self.offsets):
-            inward = -self.normals.T[:, :, None, None]
-            nearest = _least_along(inward, w, v, a, time_step) + self.offsets[:, None, None]
+            inward = -self.normals.T[:, :, None]
+            nearest = _least_along(inward, w, v, a, time_step) + self.offsets[:, None]
             least = min(least, float(nearest.min()))
         return least
 
@@ -69,9 +69,8 @@ class FenceGeometry:
 
 def _least_along(u: Real, w: Real, v: Real, a: Real, dt: float) -> Real:
     """Return the least u . w(t) on the parabola of every interval, exactly."""
-    along = [u[0] * x[0, ..., :-1] + u[1] * x[1, ..., :-1] for x in (w, v, a)]
-    end = u[0] * w[0, ..., 1:] + u[1] * w[1, ..., 1:]
-    place, speed, bend = along
+    place, speed, bend = (u[0] * x[0, :-1] + u[1] * x[1, :-1] for x in (w, v, a))
+    end = u[0] * w[0, 1:] + u[1] * w[1, 1:]
     with np.errstate(divide="ignore", invalid="ignore"):
         turn = np.where(bend > 0, -speed / bend, -1.0)
     inside = (turn > 0) & (turn < dt)

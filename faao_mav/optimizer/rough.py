@@ -12,7 +12,6 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize
-from faao_mav.optimizer.interior.search import WARM_START
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.starts import starts
@@ -77,7 +76,7 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
         constraints=kept,
         tolerance=_TOLERANCE,
         max_iterations=_SLOW_ITERATIONS if slow else _ITERATIONS,
-        strategy=WARM_START if warm and not slow else None,
+        warm=warm and not slow,
         relay=problem.maximised_queue,
     ).trajectory
     I_U, I_G = field.value(best.w.T)

@@ -61,8 +61,8 @@ class KeepOut(_Fence):
 
     def rows(self, x: Real) -> Rows:
         """Return u . w - h(u) - room and u."""
-        w, obstacles = LENGTH * x[:, None], self.geometry.obstacles
-        u, h = (part[..., 0, :] for part in obstacles.separation(w[..., :-1], w[..., 1:]))
+        w, obstacles = LENGTH * x, self.geometry.obstacles
+        u, h = obstacles.separation(w[:, :-1], w[:, 1:])
         least, pieces = h / LENGTH + self.room, len(obstacles)
         value, slope = np.ones((2 * pieces, x.shape[1])), np.zeros((2 * pieces, 2, x.shape[1]))
         for rows, at in (

@@ -10,7 +10,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import A, Constraint, V, every_excess, unknowns
 from faao_mav.optimizer.interior.queue import Queue
 from faao_mav.optimizer.interior.rewards import Rewards, Stage
-from faao_mav.optimizer.interior.search import COLD_START, SLOW_START, Search, StartStrategy
+from faao_mav.optimizer.interior.search import COLD, SLOW, WARM, Search
 from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -42,13 +42,13 @@ def maximize(
     constraints: Sequence[Constraint] = (),
     tolerance: float = 1e-6,
     max_iterations: int = 100,
-    strategy: StartStrategy | None = None,
+    warm: bool = False,
     relay: RelayQueue | None = None,
 ) -> LocalOptimum:
     """Return a local optimum that is never worse than the feasible `start`.
 
     `constraints` are kept beside those of `kin`, by `start` too; with `relay`, what it delivers is
-    maximised instead. Without a `strategy` it is that for any start. Where no gain is to be had, as
+    maximised instead. A `warm` start is one that is nearly optimal. Where no gain is to be had, as
     in saturation, or none was found, the optimum is the start itself. `stage` is called once for
     the start, once per trial step and once for the result.
 
@@ -75,7 +75,7 @@ def maximize(
         rewards if relay is None else Queue(rewards, relay, kin.time_step),
         unknowns(kin, start),
         tolerance=tolerance,
-        strategy=strategy or (SLOW_START if kin.min_speed > 0 else COLD_START),
+        mu=WARM if warm else SLOW if kin.min_speed > 0 else COLD,
     )
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
         converged = search.run(max_iterations)

@@ -7,7 +7,7 @@ given multipliers from a larger mu.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -59,22 +59,12 @@ _LEFT = 0.1
 where an obstacle's nearest side changes, g may be below 0 after a step that ends above. Chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class StartStrategy:
-    """How a search begins: the first barrier parameter mu, and the share of the `headroom`."""
+COLD, SLOW, WARM = 10.0, 0.1, 1e-2
+"""The first barrier parameter mu of any start, from which the optimum may be far away; of one with
+a least speed, where what turns where is not to be forgotten; and of one that is nearly optimal."""
 
-    mu: float
-    room: float
-
-
-COLD_START = StartStrategy(mu=10.0, room=1.0)
-"""For any start: the optimum may be far away."""
-
-SLOW_START = StartStrategy(mu=0.1, room=1.0)
-"""The same with a least speed, where what turns where is not to be forgotten."""
-
-WARM_START = StartStrategy(mu=1e-2, room=0.03)
-"""For starts that are nearly optimal."""
+_WARM_ROOM = 0.03
+"""The share of the `headroom` that nearly optimal starts are given. Chosen."""
 
 
 def best_floor(total: Real, weight: float) -> float:
@@ -109,14 +99,14 @@ class Search:
         x: Real,
         *,
         tolerance: float,
-        strategy: StartStrategy,
+        mu: float,
     ) -> None:
-        """Begin at x."""
-        self.goal, self.tolerance, self.mu = goal, tolerance, strategy.mu
-        x = np.concatenate([x, goal.begin(cold=strategy.room >= 1)])
+        """Begin at x with the barrier parameter `mu`, `WARM` where x is nearly optimal."""
+        self.goal, self.tolerance, self.mu = goal, tolerance, mu
+        x = np.concatenate([x, goal.begin(cold=mu > WARM)])
         self.system = system = System(Grid.of(kin), goal, constraints, x)
         at = system.at(x)
-        s = np.maximum(at.values, strategy.room * system.headroom)
+        s = np.maximum(at.values, (1.0 if mu > WARM else _WARM_ROOM) * system.headroom)
         y = np.zeros((len(system.chain.after), kin.slots - 1))
         floor, s = self._floor(at, s)
         z = np.where(system.floored, 1.0, system.weight * self.mu) / s
@@ -256,7 +246,7 @@ class Search:
         """Give the iterate multipliers from a larger mu: that leads away from limits."""
         it = self.iterate
         self.mu = min(
-            COLD_START.mu * self.steepness,
+            COLD * self.steepness,
             _CENTRING * float(it.s @ it.z / self.system.weight.sum()),
         )
         floor, s = self._floor(it.at, it.s)

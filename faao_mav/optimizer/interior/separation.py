@@ -15,14 +15,10 @@ from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Integers, Real
+from faao_mav.arrays import Real
 
 _SHORTEST = 1e-12
 """The least length that a direction is divided by; far below a rounding error of positions."""
-
-_FAR = 30.0
-"""The distance, m, from which an obstacle is the disc about it. Chosen: forces of obstacles so far
-away are next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -48,85 +44,50 @@ class ConvexObstacles:
 
     @cached_property
     def _sides(self) -> tuple[Real, Real]:
-        """The outward normals (V, 2, P) of the sides, and h there; h is infinite without a side."""
+        """The outward normals (V, 2, P, 1) of the sides and h there, infinite without a side."""
         along = np.roll(self.corners, -1, axis=1) - self.corners
         out = np.stack([along[..., 1], -along[..., 0]])
         length = np.hypot(*out)
         out = out / np.maximum(length, _SHORTEST)
         offset = np.einsum("cpv,pvc->vp", out, self.corners) + self.radius
-        return out.transpose(2, 0, 1), np.where(length.T > _SHORTEST, offset, np.inf)
-
-    @cached_property
-    def _discs(self) -> tuple[Real, Real]:
-        """Centers (2, P, 1, 1) and radii (P, 1, 1) of the discs about the obstacles."""
-        center = (self.corners.min(axis=1) + self.corners.max(axis=1)) / 2
-        radius = np.hypot(*(self.corners - center[:, None]).transpose(2, 0, 1)).max(axis=1)
-        return center.T[..., None, None], (radius + self.radius)[:, None, None]
+        offset = np.where(length.T > _SHORTEST, offset, np.inf)
+        return out.transpose(2, 0, 1)[..., None], offset[..., None]
 
     def separation(self, a: Real, b: Real) -> tuple[Real, Real]:
-        """Return directions u (2, P, flights, n) and h(u) there, of the straights from a to b.
+        """Return the directions u (2, P, n) of the greatest distance, and h(u) (P, n) there.
 
-        a and b are (2, flights, n). The directions are those of the greatest distance; of obstacles
-        farther than `_FAR` both are those of a disc about them.
+        The straights go from a to b, (2, n) each.
         """
-        center, size = self._discs
-        away = (a + b)[:, None] / 2 - center
-        u = _unit(away)
-        h = u[0] * center[0] + u[1] * center[1] + size
-        least = np.minimum(u[0] * a[0] + u[1] * a[1], u[0] * b[0] + u[1] * b[1]) - h
-        near = np.nonzero(least < _FAR)
-        piece, a, b = near[0], a[:, near[1], near[2]], b[:, near[1], near[2]]
-        best = self._best(piece, a, b)
-        u[0][near], u[1][near] = best
-        h[near] = self._support(piece, best)[0]
-        return u, h
-
-    def _best(self, piece: Integers, a: Real, b: Real) -> Real:
-        """Return the directions (2, m) of the greatest distances.
-
-        Of m pairs: an obstacle `piece` (m,) and the straight from a to b (2, m).
-        """
-        best, u = np.full(len(piece), -np.inf), np.zeros_like(a)
-        for direction, far in self._candidates(piece, a, b):
+        best = np.full((len(self), a.shape[1]), -np.inf)
+        u, h = np.zeros((2, *best.shape)), np.zeros(best.shape)
+        for direction, far in self._candidates(a, b):
             value = np.minimum(_dot(direction, a), _dot(direction, b)) - far
             better = value > best
             best, u = np.where(better, value, best), np.where(better, direction, u)
-        return u
+            h = np.where(better, far, h)
+        return u, h
 
-    def _candidates(self, piece: Integers, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
-        for normals, offsets in zip(*self._sides, strict=True):
-            yield normals[:, piece], offsets[piece]
-        across = _across(_unit(b - a))
-        for side in (across, -across):
-            yield side, self._support(piece, side)[0]
-        corners = self.corners[piece].transpose(2, 1, 0)
-        for end in (a, b):
-            square = (corners[0] - end[0]) ** 2 + (corners[1] - end[1]) ** 2
-            nearest = square.argmin(axis=0)
-            away = end - corners[:, nearest, np.arange(len(piece))]
-            u = _unit(away)
-            yield u, self._support(piece, u)[0]
-
-    def _support(self, piece: Integers, u: Real) -> tuple[Real, Real]:
-        """Return h(u) (m,) of obstacles `piece` and the corners p (2, m) with h = u . p + r."""
-        corners = self.corners[piece].transpose(2, 1, 0)
-        along = corners[0] * u[0] + corners[1] * u[1]
-        farthest, every = along.argmax(axis=0), np.arange(len(piece))
-        return along[farthest, every] + self.radius[piece], corners[:, farthest, every]
+    def _candidates(self, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
+        """Yield directions (2, P, n) and h there; an axis of length 1 stands for any."""
+        yield from zip(*self._sides, strict=True)
+        east, north = _unit(b - a)
+        across = np.stack([-north, east])[:, None]
+        corners = self.corners.transpose(2, 1, 0)[..., None]  # (2, V, P, 1)
+        away = [end[:, None, None] - corners for end in (a, b)]
+        nearest = [np.argmin((each**2).sum(axis=0), axis=0)[None, None] for each in away]
+        from_corners = (
+            _unit(np.take_along_axis(each, at, axis=1)[:, 0])
+            for each, at in zip(away, nearest, strict=True)
+        )
+        for u in (across, -across, *from_corners):
+            yield u, _dot(u[:, None], corners).max(axis=0) + self.radius[:, None]
 
 
 def _unit(vectors: Real) -> Real:
     """Return `vectors` (2, ...) divided by their lengths, and east for those without one."""
     length = np.hypot(*vectors)
     unit = vectors / np.maximum(length, _SHORTEST)
-    unit[0] = np.where(length > _SHORTEST, unit[0], 1.0)
-    unit[1] = np.where(length > _SHORTEST, unit[1], 0.0)
-    return np.asarray(unit)
-
-
-def _across(u: Real) -> Real:
-    """Return u, turned left by a right angle."""
-    return np.stack([-u[1], u[0]])
+    return np.where(length > _SHORTEST, unit, np.reshape((1.0, 0.0), (2, *[1] * length.ndim)))
 
 
 def _dot(x: Real, y: Real) -> Real:

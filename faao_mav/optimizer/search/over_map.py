@@ -16,7 +16,6 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.constraint import Constraint, Rows, W
 from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, objective
-from faao_mav.optimizer.interior.search import WARM_START
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
@@ -135,7 +134,7 @@ def improved_over_map(
             constraints=(*kept, Tube(now.w.T / LENGTH, radius * side / LENGTH)),
             tolerance=_TOLERANCE,
             max_iterations=iterations,
-            strategy=WARM_START,
+            warm=True,
             relay=relay,
         )
         now = found.trajectory

@@ -14,7 +14,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import Constraint, every_excess, unknowns
 from faao_mav.optimizer.interior.maximize import constraints_of
 from faao_mav.optimizer.interior.rewards import Rewards, StageValues
-from faao_mav.optimizer.interior.search import COLD_START, Search
+from faao_mav.optimizer.interior.search import COLD, Search
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 
 _TOLERANCE = 1e-4
@@ -66,9 +66,7 @@ def nearest_flight(
         rewards = Rewards(Closeness(path), start.w.T)
         if rewards.flat:
             continue
-        search = Search(
-            kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, strategy=COLD_START
-        )
+        search = Search(kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
         for most in range(_LOOK, steps + _LOOK, _LOOK) if first else (steps,):
             with np.errstate(all="ignore"):
                 converged = search.run(min(most, steps))
