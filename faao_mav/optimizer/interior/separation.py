@@ -44,51 +44,48 @@ class ConvexObstacles:
 
     @cached_property
     def _sides(self) -> tuple[Real, Real]:
-        """The outward normals (V, 2, P, 1) of the sides and h there, infinite without a side."""
+        """The outward normals (P, V, 2) of the sides and h there, infinite without a side."""
         along = np.roll(self.corners, -1, axis=1) - self.corners
-        out = np.stack([along[..., 1], -along[..., 0]])
-        length = np.hypot(*out)
-        out = out / np.maximum(length, _SHORTEST)
-        offset = np.einsum("cpv,pvc->vp", out, self.corners) + self.radius
-        offset = np.where(length.T > _SHORTEST, offset, np.inf)
-        return out.transpose(2, 0, 1)[..., None], offset[..., None]
+        out = _unit(np.stack([along[..., 1], -along[..., 0]], axis=-1), axis=-1)
+        offset = (out * self.corners).sum(axis=-1) + self.radius[:, None]
+        return out, np.where((along != 0).any(axis=-1), offset, np.inf)[..., None]
 
     def separation(self, a: Real, b: Real) -> tuple[Real, Real]:
         """Return the directions u (2, P, n) of the greatest distance, and h(u) (P, n) there.
 
         The straights go from a to b, (2, n) each.
         """
-        best = np.full((len(self), a.shape[1]), -np.inf)
-        u, h = np.zeros((2, *best.shape)), np.zeros(best.shape)
-        for direction, far in self._candidates(a, b):
+        normals, offsets = self._sides
+        values = np.minimum(normals @ a, normals @ b) - offsets
+        piece, side = np.arange(len(self))[:, None], values.argmax(axis=1)
+        best, h = values.max(axis=1), offsets[piece, side, 0]
+        u = normals[piece, side].swapaxes(1, 2)
+        for direction in self._between(a, b):
+            far = (self.corners @ direction).max(axis=1) + self.radius[:, None]
             value = np.minimum(_dot(direction, a), _dot(direction, b)) - far
-            better = value > best
-            best, u = np.where(better, value, best), np.where(better, direction, u)
-            h = np.where(better, far, h)
-        return u, h
+            better = (value > best) & direction.any(axis=1)
+            best, h = np.where(better, value, best), np.where(better, far, h)
+            u = np.where(better[:, None], direction, u)
+        return u.swapaxes(0, 1), h
 
-    def _candidates(self, a: Real, b: Real) -> Iterator[tuple[Real, Real]]:
-        """Yield directions (2, P, n) and h there; an axis of length 1 stands for any."""
-        yield from zip(*self._sides, strict=True)
-        east, north = _unit(b - a)
-        across = np.stack([-north, east])[:, None]
-        corners = self.corners.transpose(2, 1, 0)[..., None]  # (2, V, P, 1)
-        away = [end[:, None, None] - corners for end in (a, b)]
-        nearest = [np.argmin((each**2).sum(axis=0), axis=0)[None, None] for each in away]
-        from_corners = (
-            _unit(np.take_along_axis(each, at, axis=1)[:, 0])
-            for each, at in zip(away, nearest, strict=True)
-        )
-        for u in (across, -across, *from_corners):
-            yield u, _dot(u[:, None], corners).max(axis=0) + self.radius[:, None]
+    def _between(self, a: Real, b: Real) -> Iterator[Real]:
+        """Yield directions (P or 1, 2, n): across the straights, and from the nearest corners."""
+        east, north = b - a
+        across = _unit(np.stack([-north, east]), axis=0)[None]
+        yield from (across, -across)
+        squares = (self.corners**2).sum(axis=-1)[..., None] / 2
+        for end in (a, b):
+            nearest = (squares - self.corners @ end).argmin(axis=1)
+            corner = self.corners[np.arange(len(self))[:, None], nearest]
+            yield _unit(end - corner.swapaxes(1, 2), axis=1)
 
 
-def _unit(vectors: Real) -> Real:
-    """Return `vectors` (2, ...) divided by their lengths, and east for those without one."""
-    length = np.hypot(*vectors)
-    unit = vectors / np.maximum(length, _SHORTEST)
-    return np.where(length > _SHORTEST, unit, np.reshape((1.0, 0.0), (2, *[1] * length.ndim)))
+def _unit(vectors: Real, axis: int) -> Real:
+    """Return `vectors` divided by their lengths; those without one are zero, no direction."""
+    length = np.sqrt((vectors**2).sum(axis=axis, keepdims=True))
+    return np.asarray(vectors / np.maximum(length, _SHORTEST))
 
 
 def _dot(x: Real, y: Real) -> Real:
-    return np.asarray(x[0] * y[0] + x[1] * y[1])
+    """Return the products (P or 1, n) of x (P or 1, 2, n) and y (2, n)."""
+    return np.asarray(x[:, 0] * y[0] + x[:, 1] * y[1])
