@@ -24,8 +24,6 @@ class Queue(Goal):
     earlier slot. In slot 0 nothing can be forwarded, and what the last receives is worth nothing.
     """
 
-    headroom = 20.0  # twice the mu of a cold start: what is received begins at half its worth
-
     def __init__(self, rewards: Rewards, relay: RelayQueue, time_step: float) -> None:
         self.rewards, self.relay = rewards, relay
         self.noise = rewards.noise

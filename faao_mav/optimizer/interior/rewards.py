@@ -44,7 +44,6 @@ class Goal(Constraint):
 
     of = W
     inside = 0.0
-    headroom = 0.0
     noise: float
     held: tuple[int, ...] = ()
     slope: Real = np.zeros(0)
@@ -71,6 +70,7 @@ class Rewards(Goal):
     """
 
     total = True
+    headroom = 0.0
 
     def __init__(self, stage: Stage, w: Real) -> None:
         self.stage, self.values = stage, stage(w)
