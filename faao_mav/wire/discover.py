@@ -95,8 +95,7 @@ def discover(
     """Listen for heartbeats.
 
     Only what flies counts, by its MAV_TYPE: not what else is on board or on the link. Of a system
-    that is component 1, for which it waits as long as it has `patience`, and any other only
-    without it. `system` and `component` leave out all others.
+    that is component 1, or the `component` that is given. `system` leaves out all others.
 
     It ends `_SETTLE` seconds after the first, in which others are heard, once all are ready; at
     once where a `system` is given, unless the link `listens` to whoever calls; after `patience`
@@ -117,31 +116,28 @@ def discover(
             origins.setdefault(sender, {})[line.heard.origin] = None
             if isinstance(message, Heartbeat) and message.type != GROUND_STATION_TYPE:
                 vehicle = _found_vehicle(sender, message)
-                meant = system in (None, sender.system) and component in (None, sender.component)
-                if not (meant and message.of_autopilot):
-                    beside = f"MAV_TYPE {message.type} ({sender})"
-                    others[sender] = str(vehicle) if message.of_autopilot else beside
+                meant = system in (None, sender.system) and sender.component == (component or _MAIN)
+                if not message.of_autopilot:
+                    others[sender] = f"MAV_TYPE {message.type} ({sender})"
+                elif not meant:
+                    others[sender] = str(vehicle)
                 else:
                     if not found:
                         due = settled = line.now + _SETTLE * (system is None or listens)
                     armed = vehicle.armed or (sender in found and found[sender].armed)
                     found[sender] = replace(vehicle, armed=armed)
-        waited = line.now >= begun + patience
-        if line.now >= due and not (found or waited):
+        if line.now >= due and not found and line.now < begun + patience:
             late = knocks and line.now >= begun + _KNOCK
             line.say(Timesync(0, int(line.now * 1e9)), *[_KNOCKING] * late)
             due = min(line.now + _GREET, begun + patience)
         elif line.now >= due:
-            mains = {address.system for address in found if address.component == _MAIN}
-            vehicles = tuple(
-                replace(found[address], origins=tuple(origins[address]))
-                for address in sorted(found)
-                if address.component == _MAIN or address.system not in mains
-            )
-            complete = all(each.address.component == _MAIN for each in vehicles)
-            ready = all(each.ready for each in vehicles) or line.now >= begun + _BOOT
-            if line.now >= settled and ready and (complete or waited or component):
-                return Heard(vehicles, tuple(others.values()))
+            ready = all(each.ready for each in found.values()) or line.now >= begun + _BOOT
+            if line.now >= settled and ready:
+                vehicles = (
+                    replace(found[address], origins=tuple(origins[address]))
+                    for address in sorted(found)
+                )
+                return Heard(tuple(vehicles), tuple(others.values()))
             due = line.now + _LOOK_AGAIN
         line = yield due
 
@@ -163,9 +159,8 @@ def choose(
             "and which is meant is not known. Give each its own, or connect to one alone"
         )
     elif len(found) > 1:
-        option = "component" if len({each.address.system for each in found}) == 1 else "system"
         names = listed(tuple(map(str, found)))
-        problem = f"several autopilots: {names}. Choose one with --{option}"
+        problem = f"several autopilots: {names}. Choose one with --system"
     elif not found[0].ready:
         problem = f"{found[0]} does not finish booting"
     elif found[0].family is not None and found[0].vehicle is None:

@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -163,6 +164,9 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
             text=True,
         )
         _, errors = client.communicate(timeout=PATIENCE)
+        for _ in range(100):  # the mock hears of it a moment later
+            if not cancelled:
+                time.sleep(0.02)
     assert client.returncode == 1
     assert "interrupted while uploading mission at item 3 of" in errors
     assert f"cancelled. {holds}" in errors
