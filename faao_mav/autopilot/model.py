@@ -49,10 +49,10 @@ def parameter(*told: Any, **more: Any) -> Any:
 class Model(ABC):
     """How a vehicle flies: base of dataclasses of SI units whose fields are its parameters.
 
-    A field `body` is the airframe. Legs shorter than `least`, m, are not flown: both their ends
-    count as reached at once. `slowest` is the least speed, m/s, that is commanded for a leg: who
-    has more time waits at its end. `run_in` is the leg before a start at speed, as a multiple of
-    the shortest leg for that speed.
+    A field `body` is the airframe, `latitude` that of the flight, degrees. Legs shorter than
+    `least`, m, are not flown: both their ends count as reached at once. `slowest` is the least
+    speed, m/s, that is commanded for a leg: who has more time waits at its end. `run_in` is the leg
+    before a start at speed, as a multiple of the shortest leg for that speed.
     """
 
     __slots__ = ()
@@ -69,15 +69,15 @@ class Model(ABC):
                 yield replace(each.metadata["row"], key=each.name)
 
     @classmethod
-    def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:  # noqa: ARG003
+    def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:
         """Return the values that `vehicle` has, for a flight at the `latitude`, degrees.
 
         Raises `InputError` for a parameter that is no use.
         """
         values: dict[str, Any] = {each.key: vehicle.value(each.key) for each in cls.parameters()}
-        if vehicle.airframe is not None:
-            values["body"] = vehicle.airframe
-        return cls(**values)
+        beside = {"body": vehicle.airframe, "latitude": latitude}
+        known = {key: x for key, x in beside.items() if x is not None and hasattr(cls, key)}
+        return cls(**values, **known)
 
     @abstractmethod
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:

@@ -190,8 +190,8 @@ def test_splines_pass_straight_legs_without_a_stop() -> None:
 def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:
     """A degree of latitude has 110,574 m at the equator and 111,412 m at 60 degrees."""
     equator, north = (ArduCopter.from_vehicle(Vehicle(), latitude) for latitude in (0.0, 60.0))
-    assert equator.north_metre == pytest.approx(111_318.845 / 110_574.3, rel=1e-5)
-    assert north.north_metre == pytest.approx(111_318.845 / 111_412.2, rel=1e-5)
+    assert equator.scale[1] == pytest.approx(111_318.845 / 110_574.3, rel=1e-5)
+    assert north.scale[1] == pytest.approx(111_318.845 / 111_412.2, rel=1e-5)
     flown = equator.fly(path_of([0, 2000j], 8))
     np.testing.assert_allclose(flown.position[-1], [0, 2000, 30], atol=1.0)
 

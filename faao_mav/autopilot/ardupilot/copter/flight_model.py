@@ -71,7 +71,7 @@ class ArduCopter(ArduCopterLimits):
             raise InputError("flight path: expected speeds above 0")
         stopping = waits > 0
         stopping[[0, -1]] = True
-        scale = np.array([self.east_metre, self.north_metre, 1.0])
+        scale = self.scale
         target = Target(path.points * scale, path.speeds, path.splines, stopping, self)
         clock = _Clock(self, target.passed[stopping], waits[stopping])
         samples = Samples(path.longest)

@@ -4,13 +4,15 @@ Source: ArduPilot 4.7, parameter list of Copter.
 """
 
 import math
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
+import numpy as np
+
+from faao_mav.arrays import Real
 from faao_mav.autopilot.ardupilot import ARDUPILOT, SHARED
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
-from faao_mav.autopilot.parameter import Parameter, ParameterValues, row, rule, table
+from faao_mav.autopilot.parameter import Parameter, row, rule, table
 from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
@@ -23,8 +25,9 @@ _LEAST_INPUT_TIME = 0.1
 class ArduCopterLimits(Model):
     """What bounds a flight of ArduCopter, in SI units.
 
-    A `corner_acceleration` of 0 stands for twice `acceleration`. `east_metre` and `north_metre` are
-    the autopilot's metres per metre: it takes the Earth for a sphere. `body` is the aircraft.
+    A `corner_acceleration` of 0 stands for twice `acceleration`. `latitude` is that of the flight,
+    degrees, None where metres are the autopilot's, which takes the Earth for a sphere. `body` is
+    the aircraft.
     """
 
     cruise_speed: float = parameter("m/s", 10.0, "WP_SPD", "WPNAV_SPEED")
@@ -46,21 +49,16 @@ class ArduCopterLimits(Model):
     position_gain: float = parameter("1/s", 1.0, "PSC_NE_POS_P", "PSC_POSXY_P", 1.0)
     velocity_gain: float = parameter("1/s", 2.0, "PSC_NE_VEL_P", "PSC_VELXY_P", 1.0)
     velocity_integral: float = parameter("1/s^2", 1.0, "PSC_NE_VEL_I", "PSC_VELXY_I", 1.0, least=0)
-    east_metre: float = 1.0
-    north_metre: float = 1.0
+    latitude: float | None = None
     body: CopterBody = ARDUCOPTER_BODY
 
-    @classmethod
-    def from_vehicle(cls, vehicle: ParameterValues, latitude: float | None = None) -> Self:
-        """Return the values that `vehicle` has; raises `InputError` for one that is no use.
-
-        With the `latitude` of the flight, degrees, metres are counted as the autopilot does.
-        """
-        limits = super(ArduCopterLimits, cls).from_vehicle(vehicle)
-        if latitude is None:
-            return limits
-        east, north = _metres(latitude)
-        return replace(limits, east_metre=east, north_metre=north)
+    @property
+    def scale(self) -> Real:
+        """The autopilot's metres per metre, east, north and up, (3,)."""
+        if self.latitude is None:
+            return np.ones(3)
+        there = LocalFrame(self.latitude, 0.0).to_geodetic([1.0, 1.0])
+        return np.append(ARDUPILOT.local_frame(self.latitude, 0.0).to_local(*there), 1.0)
 
     @property
     def rise(self) -> float:
@@ -94,10 +92,3 @@ TABLE = table(
     rule("rally_home", 1, "RALLY_INCL_HOME"),
 )
 """ArduCopter's parameters."""
-
-
-def _metres(latitude: float) -> tuple[float, float]:
-    """The autopilot's metres per metre of WGS84 at `latitude` degrees, east and north."""
-    there = LocalFrame(latitude, 0.0).to_geodetic([1.0, 1.0])
-    east, north = ARDUPILOT.local_frame(latitude, 0.0).to_local(*there).tolist()
-    return east, north
