@@ -152,6 +152,7 @@ def row(folder: str, name: str) -> Row:
             model = vehicle.flight_model(-35.36)
             before = model.cruise_speed if math.isnan(recorded.before) else recorded.before
             start = path.points[0] - [0.0, 0.0, _TAKEN_OFF]
+            path = replace(path, holds=np.floor(path.holds))
             flown, most = model.fly(_with(path, start, before)), 1
         case _:
             # When the last waypoint is left depends on where the item after it is. The flight is

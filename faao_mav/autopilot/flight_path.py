@@ -28,11 +28,10 @@ class FlightPath:
 
     `points` (m, 3) are east, north, up in metres, m >= 1. `speeds` (m - 1,), m/s, are the ground
     speeds commanded for the leg that ends at point k + 1, in force from that leg's start. `holds`
-    (m,), s, say how long the aircraft is told to wait at each point, as commanded: what the
-    autopilot makes of fractions is the model's business. `delays` (m,), s, come on top: NAV_DELAY
-    items after the point, which keep fractions. `splines` (m,) marks points that are spline
-    waypoints; `radii` (m,), m, are acceptance radii, 0 for the autopilot's own. A flight that turns
-    out to take more than `longest`, s, need not be followed to its end: `InputError`.
+    (m,), s, say how long the aircraft waits at each point: what is left of it once the autopilot
+    has stored it. `splines` (m,) marks points that are spline waypoints; `radii` (m,), m, are
+    acceptance radii, 0 for the autopilot's own. A flight that turns out to take more than
+    `longest`, s, need not be followed to its end: `InputError`.
 
     Heights count from `elevation`, m above sea level. The air moves at `wind`, east and north, m/s,
     steadily and everywhere. An aeroplane comes over the first point at the velocity `entry` (3,),
@@ -44,7 +43,6 @@ class FlightPath:
     holds: Real
     splines: NDArray[np.bool_]
     radii: Real
-    delays: Real | float = 0.0
     longest: float = LONGEST
     elevation: float = 0.0
     entry: Real | None = None

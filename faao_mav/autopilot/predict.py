@@ -112,7 +112,6 @@ class _Stop(NamedTuple):
     item: int
     speed: float
     hold: float = 0.0
-    delay: float = 0.0
     spline: bool = False
     radius: float = 0.0
 
@@ -154,12 +153,13 @@ class _Walk:
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
             case Command.NAV_DELAY if hovers and math.isfinite(number):
-                self._towards(index, self._last, delay=number)
+                self._towards(index, self._last, hold=number)
             case Command.DO_CHANGE_SPEED:
                 self._change_speed(item)
             case command if command in FLOWN_TO:
                 goal, radius = self._spot(index, item), item.params[1]
                 hold = number if hovers and command in _HOLDING and number < math.inf else 0.0
+                hold = math.floor(hold) if self._type.whole_second_holds else hold
                 own = command == Command.NAV_WAYPOINT and 0 < radius < math.inf
                 spline = command == Command.NAV_SPLINE_WAYPOINT
                 radius = radius if own else 0.0
@@ -181,7 +181,7 @@ class _Walk:
         if not stops:
             return
         home, start = self._mission.home, _Stop(self._place, 0, 0.0)
-        points, items, speeds, holds, delays, splines, radii = (
+        points, items, speeds, holds, splines, radii = (
             np.array(column) for column in zip(start, *stops, strict=True)
         )
         path = FlightPath(
@@ -190,7 +190,6 @@ class _Walk:
             holds=holds,
             splines=splines,
             radii=radii,
-            delays=delays,
             longest=self._longest - self._clock,
             elevation=0.0 if home is None or math.isnan(home.altitude) else home.altitude,
             wind=self._wind,
@@ -213,7 +212,7 @@ class _Walk:
         level, rise = np.hypot(ways[:, 0], ways[:, 1]) / path.speeds, ways[:, 2]
         limit = np.where(rise > 0, self._vertical.climb_speed, self._vertical.descent_speed)
         legs = np.maximum(level, np.abs(rise) / limit)
-        return float(legs.sum() + np.sum(path.holds + path.delays))
+        return float(legs.sum() + np.sum(path.holds))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         self._fly()
@@ -236,13 +235,12 @@ class _Walk:
         goal: Real,
         *,
         hold: float = 0.0,
-        delay: float = 0.0,
         spline: bool = False,
         radius: float = 0.0,
     ) -> None:
         here = self._last
         goal = here if np.abs(goal - here).max() <= _SAME_PLACE else goal
-        self._stretch.append(_Stop(goal, index, self._speed, hold, delay, spline, radius))
+        self._stretch.append(_Stop(goal, index, self._speed, hold, spline, radius))
 
     @property
     def _last(self) -> Real:

@@ -83,19 +83,15 @@ class Route:
         holds = np.floor(self.waits) if whole_seconds else self.waits
         return holds, np.round(self.waits - holds, 9)
 
-    def path(
-        self, *, whole_seconds: bool, altitude: float = 0.0, wind: Vector = (0.0, 0.0)
-    ) -> FlightPath:
+    def path(self, *, altitude: float = 0.0, wind: Vector = (0.0, 0.0)) -> FlightPath:
         """Return the legs as a flight model takes them, in a `wind`, m/s.
 
         All are at `altitude`, m above sea level.
         """
-        holds, delays = self.holds_and_delays(whole_seconds=whole_seconds)
         return FlightPath(
             points=np.column_stack([self.positions, np.zeros(len(self.positions))]),
             speeds=self.speeds,
-            holds=holds,
-            delays=delays,
+            holds=self.waits,
             splines=np.zeros(len(self.positions), dtype=bool),
             radii=self.radii,
             elevation=altitude,

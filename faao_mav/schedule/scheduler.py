@@ -66,8 +66,7 @@ class Scheduler(ABC):
     def flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`, which is rounded for it."""
         route = self._with_radii(route.rounded())
-        whole_seconds = self.vehicle.type.whole_second_holds
-        path = route.path(whole_seconds=whole_seconds, altitude=self.altitude, wind=self.wind)
+        path = route.path(altitude=self.altitude, wind=self.wind)
         return Schedule(route, self.model.fly(path), self.t, self.w, self.tolerance)
 
     def fitted(self, route: Route, top_speed: float, *, groups: Integers | None = None) -> Schedule:

@@ -126,7 +126,7 @@ class Px4(Px4Limits):
         """
         speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        holds = (path.holds + path.delays).tolist()
+        holds = path.holds.tolist()
         speeds, radii = np.minimum(speeds, self.max_speed), np.maximum(radii, _NEAREST)
         route = legs(self, path.points, radii, speeds, holds)
         flight = _Flight(self, path)

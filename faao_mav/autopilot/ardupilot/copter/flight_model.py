@@ -40,8 +40,7 @@ class ArduCopter(ArduCopterLimits):
     overlap at corners; its clock waits for an aircraft that falls behind; a position controller
     with limited lean angle follows it. The aircraft therefore starts late, overshoots stops by up
     to a metre, and comes to its full speed only seconds after its target. Acceptance radii of
-    waypoints are not stored by this autopilot, so `FlightPath.radii` do not count; holds are
-    whole seconds (fractions are dropped), delays are kept to the fraction.
+    waypoints are not stored by this autopilot, so `FlightPath.radii` do not count.
     """
 
     least: ClassVar[float] = _SHORTEST
@@ -66,7 +65,7 @@ class ArduCopter(ArduCopterLimits):
         Raises `InputError` for speeds that are not positive and finite, and for a flight that takes
         more than `path.longest`.
         """
-        waits = np.floor(path.holds) + path.delays
+        waits = path.holds
         if not np.all(np.isfinite(path.speeds) & (path.speeds > 0)):
             raise InputError("flight path: expected speeds above 0")
         stopping = waits > 0
