@@ -64,11 +64,6 @@ class Flown:
     position: Real
     velocity: Real
 
-    @property
-    def leg_durations(self) -> Real:
-        """How long each leg takes, from leaving a point to reaching the next one, (m - 1,), s."""
-        return self.arrivals[1:] - self.departures[:-1]
-
 
 STEP = 0.1
 """The longest step of a flight, s: the one that the models were calibrated with."""
