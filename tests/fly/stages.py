@@ -24,7 +24,7 @@ from stations import FOREIGN, HOME, RALLY, a_mission, rows_for, vehicle_of
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
-from faao_mav.wire.messages import CommandAck, GlobalPositionInt, Message
+from faao_mav.wire.messages import CommandAck, GlobalPositionInt, Message, MissionCurrent
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
 
@@ -108,6 +108,10 @@ class Stage:
                 self._blinds(begin)
             elif words == ["hold-up"]:
                 self._holds_up(begin, end)
+            elif words == ["lag"]:
+                self._lags()
+            elif words == ["unready"]:
+                self._denies_arming(end)
             elif words[0] in ("station", "twin", "companion"):
                 address = {"station": FOREIGN, "companion": Address(1, 191)}.get(
                     words[0], GROUND_STATION
@@ -143,6 +147,22 @@ class Stage:
             return out
 
         self.scene.tells(bursts)
+
+    def _lags(self) -> None:
+        """Tell the item under way a message later, which is a second."""
+        told: list[Message] = []
+
+        def late(said: Message, _: float) -> Sequence[Message]:
+            if isinstance(said, MissionCurrent):
+                told.append(said)
+                return told[-2:-1] or [said]
+            return [said]
+
+        self.scene.tells(late)
+
+    def _denies_arming(self, until: float) -> None:
+        mock, arm = self.scene.mock, self.scene.mock._arm
+        mock._arm = lambda wanted, now: 4 if wanted and now < until else arm(wanted, now)
 
     def _event(self, word: str, number: str = "0") -> Any:
         scene, mock = self.scene, self.scene.mock
