@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+import shapely
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError, InputError
@@ -111,8 +112,6 @@ def _way(fence: FreeArea, margin: float, start: Real, end: Real) -> Real | None:
 
     It keeps the `margin`, m, from the edge of `fence`. None where there is no way.
     """
-    import shapely
-
     area = _kept(fence, margin)
     for simpler in _SIMPLER:
         offset = -(margin + simpler)

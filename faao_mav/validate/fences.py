@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.arrays import Flags
 from faao_mav.geodesy import LocalFrame
@@ -14,9 +16,6 @@ from faao_mav.mission.fence_area import Area, FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.vector import lengths
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
@@ -48,8 +47,6 @@ class _Fence:
     @classmethod
     def of(cls, context: ValidationContext) -> Self:
         """Return the fence of a mission that has one, without a local frame about its own place."""
-        import shapely
-
         frame = context.frame or LocalFrame(*context.mission.fence.place)
         any_inclusion = context.vehicle.type.fence_needs_one_inclusion(context.vehicle)
         areas = areas_of(context.mission.fence, frame)
@@ -59,15 +56,10 @@ class _Fence:
 
     def leave(self, shapes: Shapes) -> Flags:
         """Return which of `shapes` (n,) leave the fence, (n,)."""
-        import shapely
+        return np.asarray(~shapely.covers(self.allowed.shape, shapes))
 
-        return np.asarray(~shapely.covers(self.allowed.shape, shapes), dtype=np.bool_)
-
-    def broken_by(self, shape: "BaseGeometry") -> list[tuple[str, float]]:
-        """Return in words the first parts that `shape` breaks, and which length of it does, m."""
-        return [*islice(self._broken_by(shape), _NAMED)]
-
-    def _broken_by(self, shape: "BaseGeometry") -> Iterator[tuple[str, float]]:
+    def broken_by(self, shape: BaseGeometry) -> Iterator[tuple[str, float]]:
+        """Yield in words the parts that `shape` breaks, and which length of it does, m."""
         inclusions = [(f"outside {a.name}", a.shape) for a in self.areas if a.inclusion]
         if self.any_inclusion and len(inclusions) > 1:
             free = free_area(self.areas, any_inclusion=True)
@@ -82,18 +74,14 @@ class _Fence:
 
     def where(self, shape: Any) -> str:
         """Return in words which parts `shape`, or a place (2,), m, breaks; "" if none."""
-        import shapely
-
         shape = shape if isinstance(shape, shapely.Geometry) else shapely.Point(shape)
-        return " and ".join(broken for broken, _ in self.broken_by(shape))
+        return " and ".join(broken for broken, _ in islice(self.broken_by(shape), _NAMED))
 
     def nearest(self, shapes: Shapes) -> tuple[int, float] | None:
         """Return which of `shapes` (n,) comes nearest to an edge, and how near, m.
 
         None where there is no edge: a fence that encloses nothing.
         """
-        import shapely
-
         rings = [shapely.LinearRing(edge) for edge in self.allowed.edges()]
         if not rings:
             return None
@@ -133,7 +121,8 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
     told = set()
     for k in np.flatnonzero(fence.leave(legs)).tolist():
         leg, jump = context.legs[k], " by a jump" if context.legs[k].jump else ""
-        broken = (f"{length:.1f} m of it {what}" for what, length in fence.broken_by(legs[k]))
+        parts = islice(fence.broken_by(legs[k]), _NAMED)
+        broken = (f"{length:.1f} m of it {what}" for what, length in parts)
         told.add(leg.index)
         yield hit("fence-leg", leg.index, leg=leg, jump=jump, parts=" and ".join(broken))
     for k in np.flatnonzero(fence.leave(circles)).tolist():
@@ -159,8 +148,6 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
 
 def _shapes(context: ValidationContext) -> list[Shapes]:
     """Return legs, circles, and the predicted flight from sample to sample."""
-    import shapely
-
     legs = np.array([[leg.start.ground, leg.end.ground] for leg in context.legs])
     circles, flown = np.array([*context.circles.values()]), np.empty((1, 2))
     if context.track_positions is not None:
@@ -189,8 +176,6 @@ def _kept(context: ValidationContext, fence: _Fence) -> Hits:
     velocity, speed = track.velocity[:, :2], lengths(track.velocity[:, :2])
     ahead = vehicle.type.fence_ahead(vehicle, speed)
     if ahead.any():
-        import shapely
-
         heading = velocity / np.maximum(speed, _STILL)[:, None]
         tested = np.asarray(shapely.points(positions[:, :2] + heading * ahead[:, None]))
         for index, k in _firsts(fence.leave(tested) & (speed > _STILL), track.item):

@@ -9,15 +9,10 @@ from pathlib import Path
 from faao_mav.errors import InputError
 from faao_mav.files import check_writable
 
-_MARK = "for "
-
-_LOOKED_AT = 200
-"""Bytes of a file in which its comment is looked for: the first line, or the second. Chosen."""
-
 
 def comment_for(mission: Path) -> str:
     """Return what a file that is written beside `mission` says in its first comment."""
-    return f"{_MARK}{mission.name}"
+    return f"for {mission.name}"
 
 
 def check_replaceable(beside: Path, what: str) -> None:
@@ -35,19 +30,18 @@ def check_replaceable(beside: Path, what: str) -> None:
 
 def remove_outdated(beside: Path) -> None:
     """Remove `beside` if an earlier run wrote it: it belongs to a mission that is gone."""
-    if _is_of_a_run(beside):
-        try:
+    try:
+        if _is_of_a_run(beside):
             beside.unlink()
-        except OSError as error:
-            raise InputError(
-                f"{beside}: is of an earlier mission and cannot be removed: {error.strerror}"
-            ) from None
+    except OSError as error:
+        raise InputError(
+            f"{beside}: is of an earlier mission and cannot be removed: {error.strerror}"
+        ) from None
 
 
 def _is_of_a_run(beside: Path) -> bool:
-    """Tell whether `beside` is a file that this program wrote beside a mission."""
+    """Tell by the first two lines whether this program wrote `beside` beside a mission."""
     if not beside.is_file():
         return False
     with beside.open("rb") as file:
-        beginning = file.read(_LOOKED_AT)
-    return any(line.startswith(f"# {_MARK}".encode()) for line in beginning.split(b"\n")[:2])
+        return any(file.readline(200).startswith(b"# for ") for _ in range(2))
