@@ -5,8 +5,6 @@ from typing import Any
 
 import pytest
 from conftest import MakePlan
-from hypothesis import given
-from hypothesis import strategies as st
 from relay_flights import plan_with
 
 from faao_mav.errors import InputError
@@ -63,20 +61,3 @@ def test_the_line_names_what_sets_the_limit(small_plan: MakePlan) -> None:
         check_vehicle(slow)
     with pytest.raises(InputError, match=r"vehicle\.parameters.*WPNAV_JERK: 0"):
         check_vehicle(plan_with(parameters={"WPNAV_JERK": 0.0}))
-
-
-@given(
-    st.sampled_from(["ardupilot", "px4"]), st.booleans(), st.floats(0.2, 300), st.floats(0.2, 90)
-)
-def test_what_is_accepted_is_accepted(
-    small_plan: MakePlan, autopilot: str, keep: bool, speed: float, acceleration: float
-) -> None:
-    wanted = limited(small_plan, speed, acceleration, autopilot=autopilot, keep=keep)
-    accepted = {
-        key: float(most)
-        for line in beyond_vehicle(wanted)
-        for key, most in re.findall(r"vehicle\.(\w+): .* at most (\S+) m/s", line)
-    }
-    assert all(most < getattr(wanted.vehicle, key) for key, most in accepted.items())
-    tamed = wanted.changed({f"vehicle.{key}": most for key, most in accepted.items()})
-    assert beyond_vehicle(tamed) == []

@@ -102,15 +102,6 @@ def test_setting_out_before_the_plan_is_found() -> None:
     assert fitted(planned(begin, ahead=0.8), at_speed).route.lead == 0
 
 
-def test_how_late_a_flight_is_over() -> None:
-    route = route_with(SPEEDS, WAITS)
-    plan = planned(route)
-    assert plan.flight(route).late == pytest.approx(0, abs=0.01)
-    assert plan.flight(replace(route, lead=0.7)).late == pytest.approx(-0.7, abs=0.01)
-    longer = plan.flight(route_with(SPEEDS, WAITS + np.array([0, 0, 3, 0, 0])))
-    assert longer.late == pytest.approx(3, abs=0.05)
-
-
 def test_groups_bounds_and_holds_are_kept() -> None:
     begin = route_with(SPEEDS, WAITS)
     speeds = fitted(planned(begin), begin, groups=np.array([0, 0, 1, 1])).route.speeds
