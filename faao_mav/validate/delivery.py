@@ -30,38 +30,33 @@ NOTHING = 1e-3
 
 
 @checks()
-def _plan(context: ValidationContext) -> Hits:
-    """What is wrong with the plan itself, or with its place."""
+def _link(context: ValidationContext) -> Hits:
+    """What is wrong with the plan itself, and how the flight carries it out."""
     link = context.link
-    if link is not None and link.planned_delivered < NOTHING:
-        yield hit("link-nothing")
-    for told, instead in doubtful_values(link.radio) if link and link.radio else ():
-        yield hit("radio-values", told=told, instead=instead)
-    for told in link.unmeasured if link else ():
-        yield hit("link-unmeasured", told=told)
-    if link is not None and link.elsewhere:
-        yield hit("link-elsewhere", away=link.away / 1000)
-
-
-@checks()
-def _flight(context: ValidationContext) -> Hits:
-    """How the flight carries the plan out; nothing is said of one at another place."""
-    link = context.link
-    if link is None or link.elsewhere:
+    if link is None:
         return
-    percent, where = 100 * link.share, ""
-    if (worst := link.worst) is not None:
+    if link.planned_delivered < NOTHING:
+        yield hit("link-nothing")
+    for told, instead in doubtful_values(link.radio) if link.radio else ():
+        yield hit("radio-values", told=told, instead=instead)
+    for told in link.unmeasured:
+        yield hit("link-unmeasured", told=told)
+    if link.elsewhere:  # and nothing is said of the flight
+        yield hit("link-elsewhere", away=link.away / 1000)
+        return
+    percent, worst, where = 100 * link.share, link.worst, ""
+    if worst is not None:
         where = f"; {worst.rate_lost:.3g} of it between {worst.start:.0f} and {worst.end:.0f} s"
     if percent < GOOD_PERCENT:
         yield hit("link-rate-reduced", percent=percent, where=where)
-    if link.path_error > link.path_tolerance + PATH_ALLOWANCE:
-        yield hit("link-path")
-    if link.late > max(LATE, LATE_PERCENT / 100 * link.planned_duration):
-        yield hit("link-late")
-    if link.rms_position_error > APART:
-        yield hit("link-apart")
-    if link.altitude_error > ALTITUDE_ERROR:
-        yield hit("link-altitude")
+    for rule, holds in (
+        ("link-path", link.path_error > link.path_tolerance + PATH_ALLOWANCE),
+        ("link-late", link.late > max(LATE, LATE_PERCENT / 100 * link.planned_duration)),
+        ("link-apart", link.rms_position_error > APART),
+        ("link-altitude", link.altitude_error > ALTITUDE_ERROR),
+    ):
+        if holds:
+            yield hit(rule)
     yield hit("link-timing", percent=percent)
     if link.late_share is not None:
         yield hit("link-moving", late=LATE_START, percent=100 * link.late_share)
