@@ -57,7 +57,8 @@ def steps() -> Trajectory:
 def flight(request: pytest.FixtureRequest) -> tuple[Conversion, float]:
     """A conversion, and how far off it strays, m, whose waypoints lie on the path."""
     trajectory, astray = request.param
-    return converted(*trajectory(), plane_plan()), astray
+    t, w = trajectory()
+    return converted(t, w, plane_plan()), astray
 
 
 def test_the_path_is_kept_where_plain_waypoints_would_lose_it(
