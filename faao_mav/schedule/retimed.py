@@ -53,13 +53,14 @@ class Retimed:
         D(t, v') + sum_k (h'_k - h_k) [t > departure k],  D = sum_k d_k(t) T_k(v').
 
     T_k is by how much longer leg k takes, d_k(t), from 0 to 1, the share of it that has come up by
-    t: it grows while the leg is flown at its command. What is `known` of the vehicle tells T_k;
-    without that it is c_k (v_k / v'_k - 1), c_k being how long the leg is flown at its command. A
+    t: it grows with the way that is flown, the more the nearer the speed is to the command. What is `known` of the vehicle tells T_k;
+    without that it is c_k (v_k / v'_k - 1), c_k being how long the leg would
+    take at its command. A
     command that is not reached, as on a short leg, counts as the greatest speed of the leg:
     `limits` (m - 1,), m/s, infinite where it is reached.
     """
 
-    def __init__(self, schedule: Schedule, known: LegDurations | None = None) -> None:
+    def __init__(self, schedule: Schedule, known: LegDurations | None) -> None:
         route, flown = schedule.route, schedule.flown
         self._waits, self._lead, self._known = route.waits, route.lead, known
         self._t, self._places = flown.t[::_STRIDE], flown.position[::_STRIDE, :2]

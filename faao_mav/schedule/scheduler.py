@@ -83,7 +83,8 @@ class Scheduler(ABC):
         cost = goal.cost(best)
         before = math.inf
         while cost < (1 - _LEAST_GAIN) * before:
-            tried, foreseen = stepped(goal, unknowns, self._retimed(best), x)
+            known = self.model.leg_durations(best.route.leg_lengths, best.route.joined)
+            tried, foreseen = stepped(goal, unknowns, Retimed(best, known), x)
             if foreseen > (1 - _LEAST_GAIN) * cost:
                 break
             try:
@@ -95,11 +96,6 @@ class Scheduler(ABC):
                 break
             x, best, cost = tried, flown, now
         return best
-
-    def _retimed(self, schedule: Schedule) -> Retimed:
-        """Return what `schedule` becomes at other commands."""
-        route = schedule.route
-        return Retimed(schedule, self.model.leg_durations(route.leg_lengths, route.joined))
 
     def with_waypoints(self, route: Route, times: Real) -> Route:
         """Return the route with a waypoint more where the plan is at each of `times` (k,), s."""

@@ -1,7 +1,7 @@
 """What the rules look at: a mission, its vehicle, and what follows from both."""
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
@@ -139,10 +139,6 @@ class ValidationContext:
             if all(map(math.isfinite, here)):  # not so at the antipode
                 places.append(PlacedItem(k, *here, self.height(item)))
         return tuple(places)
-
-    def places_of(self, commands: Collection[int]) -> Iterator[PlacedItem]:
-        """Yield the places of the items with one of `commands`."""
-        return (each for each in self.places if self.items[each.index].command in commands)
 
     def height(self, item: MissionItem) -> float:
         """Return metres above home to `item`, NaN where nothing tells them."""

@@ -81,25 +81,8 @@ RTL = do(Command.NAV_RETURN_TO_LAUNCH)
 LAND = at(0, 0, 0, command=Command.NAV_LAND)
 
 
-def speed(value: float) -> MissionItem:
-    return do(Command.DO_CHANGE_SPEED, 1.0, value, -1.0)
-
-
-def mission(*items: MissionItem, home: Home | None = HOME, **beside: Any) -> Mission:
-    return Mission(items, home, **beside)
-
-
-def flown(*items: MissionItem, **beside: Any) -> Mission:
-    """Take-off, `items`, return."""
-    return mission(TAKEOFF, *items, RTL, **beside)
-
-
 def polygon(*corners: tuple[float, float], inclusion: bool = True) -> Polygon:
     return Polygon(tuple(latlon(*corner) for corner in corners), inclusion)
-
-
-def circle(east: float, north: float, radius: float, *, inclusion: bool = False) -> Circle:
-    return Circle(latlon(east, north), radius, inclusion)
 
 
 def track(
@@ -167,13 +150,13 @@ def given(line: str) -> Given:
                 [r[:3] for r in rows[1:]], [int(r[3]) for r in rows[2:]], first[0]
             )
         elif head == "square":
-            (half, east) = first[0] / 2, first[1] if first[1:] else 0.0
+            half, east = first[0] / 2, first[1] if first[1:] else 0.0
             ways = ((-half, -half), (half, -half), (half, half), (-half, half))
             parts["polygons"] += [polygon(*((east + x, y) for x, y in ways))] * times
         elif head == "area":
             parts["polygons"].append(polygon(*((x, y) for x, y in rows)))
         elif head in ("disc", "zone"):
-            parts["circles"].append(circle(first[0], first[1], first[2], inclusion=head == "disc"))
+            parts["circles"].append(Circle(latlon(*first[:2]), first[2], head == "disc"))
         elif head in ("rally", "back"):
             point = RallyPoint(*latlon(*first[:2]), first[2])
             parts["rally"] += [point] * times if head == "rally" else []
@@ -196,7 +179,7 @@ def given(line: str) -> Given:
     case["limits"] = Limits(**named["max"])
     if case.get("link") is not None:
         case["link"] = replace(LINK, **named["link"])
-    told = mission(*items, home=home, fence=fence, rally=tuple(parts["rally"]))
+    told = Mission(tuple(items), home, fence, tuple(parts["rally"]))
     if case.pop("predicted", False):
         case["track"] = predict(told, case["vehicle"])
     return Given(told, **case)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import FLYABLE, SMALL, edited
-from judged import COPTER, LINK, VEHICLES, Given, check, flown, given
+from judged import COPTER, LINK, VEHICLES, Given, check, given
 
 from faao_mav.autopilot.body import CopterBody
 from faao_mav.optimizer.optimize import optimize
@@ -18,6 +18,7 @@ from faao_mav.validate.speeds import beyond_lean
 from faao_mav.workflow import Result, with_mission
 
 LIMITS = Path(__file__).parents[1] / "data" / "validate" / "limits.tsv"
+FLOWN = given("takeoff return").mission
 ROWS = [line.split("\t") for line in LIMITS.read_text().splitlines() if not line.startswith("#")]
 
 
@@ -53,7 +54,7 @@ def test_a_doubtful_radio_is_told_with_the_likely_slip() -> None:
         ({"base_station.power_dbm": 100}, {"base_station.power_dbm": 40}, ""),
     ):
         links = [replace(LINK, radio=radio(**changes)) for changes in (trips, passes)]
-        wrong, right = (Given(flown(), COPTER, link=link) for link in links)
+        wrong, right = (Given(FLOWN, COPTER, link=link) for link in links)
         check("radio-values", wrong, None, right)
         assert action in wrong.by("radio-values")[0].action
 
@@ -102,10 +103,10 @@ def test_the_airframe_decides_what_leaning_gives() -> None:
 
 def test_what_findings_say() -> None:
     link = replace(LINK, predicted_delivered=0.5, worst=Stretch(30, 41, 0.05))
-    (found,) = Given(flown(), COPTER, link=link).by("link-rate-reduced")
+    (found,) = Given(FLOWN, COPTER, link=link).by("link-rate-reduced")
     assert "25.0 %; 0.05 of it between 30 and 41 s" in found.message
     far = replace(LINK, path_error=7e6, away=7e6, rms_position_error=7e6, predicted_delivered=0.0)
-    assert [each.rule for each in validate(Given(flown(), COPTER, link=far))] == ["link-elsewhere"]
+    assert [each.rule for each in validate(Given(FLOWN, COPTER, link=far))] == ["link-elsewhere"]
     (found,) = given("home=47.4,8.5,400 waypoint@8.5012,47.4003,30").by("too-far")
     assert found.action == "latitude and longitude look exchanged: correct them"
     (found,) = given("px4 square:100,50.1 takeoff return").by("fence-home")
