@@ -1,8 +1,7 @@
 """What a flight becomes at other commands, told from one flight that is known.
 
-Legs are causal. The speed of a leg changes how long the part of it takes that is flown at the
-command, a wait how long the aircraft stays; everything behind comes later by as much, along the
-same path. So one predicted flight tells how all its positions depend on all its commands, and no
+Legs are causal. The speed of a leg changes how long it takes, a wait how long the aircraft stays;
+everything behind comes later by as much, along the same path. So one predicted flight tells how all its positions depend on all its commands, and no
 further flight has to be predicted for a slope. How long legs take at other speeds is known of some
 autopilots (``model.LegDurations``); of others the flight tells.
 
@@ -53,10 +52,9 @@ class Retimed:
         D(t, v') + sum_k (h'_k - h_k) [t > departure k],  D = sum_k d_k(t) T_k(v').
 
     T_k is by how much longer leg k takes, d_k(t), from 0 to 1, the share of it that has come up by
-    t: it grows with the way that is flown, the more the nearer the speed is to the command. What is `known` of the vehicle tells T_k;
-    without that it is c_k (v_k / v'_k - 1), c_k being how long the leg would
-    take at its command. A
-    command that is not reached, as on a short leg, counts as the greatest speed of the leg:
+    t: it grows with the way that is flown. What is `known` of the vehicle tells T_k; without that
+    it is c_k (v_k / v'_k - 1), c_k being how long the leg takes at its command. A command that is
+    not reached, as on a short leg, counts as the greatest speed of the leg:
     `limits` (m - 1,), m/s, infinite where it is reached.
     """
 
