@@ -1,9 +1,10 @@
 """What a flight becomes at other commands, told from one flight that is known.
 
 Legs are causal. The speed of a leg changes how long it takes, a wait how long the aircraft stays;
-everything behind comes later by as much, along the same path. So one predicted flight tells how all its positions depend on all its commands, and no
-further flight has to be predicted for a slope. How long legs take at other speeds is known of some
-autopilots (``model.LegDurations``); of others the flight tells.
+everything behind comes later by as much, along the same path. So one predicted flight tells how all
+its positions depend on all its commands, and no further flight has to be predicted for a slope. How
+long legs take at other speeds is known of some autopilots (``model.LegDurations``); of others the
+flight tells.
 
 Constants that name no source are chosen; what a change costs is not measured.
 """
