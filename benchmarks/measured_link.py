@@ -4,15 +4,17 @@
 
 Each table is a flight at a height of its own, as `faao-mission link` reads them. Each in turn is
 left out, the law is fitted to the others, and its rms error on that flight stands beside that of
-d^-2, and beside the spread that the fit itself told.
+d^-2, that with the map of what the law leaves of the others, and the spread that the fit told.
 """
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from faao_mav.radio.fit import LinkFit, Samples, fit_link
+from faao_mav.radio.kriging import kriged
 from faao_mav.radio.measured import read_measured
 
 
@@ -24,6 +26,10 @@ def square_law(flights: list[Samples]) -> LinkFit:
     return LinkFit(at, 2.0, (), (), 0.0, 0.0, 0.0, 0.0, 1, 1, ())
 
 
+def told(errors: Iterable[float]) -> str:
+    return ", ".join(f"{error:.2f}" for error in errors)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--station", required=True)
@@ -31,18 +37,21 @@ def main() -> None:
     given = parser.parse_args()
     station = tuple(map(float, given.station.split(",")))
     flights = [read_measured(path, station).samples for path in given.tables]
-    print("left out, law, rms error dB: law, d^-2; spread told dB")
+    print("left out, law, rms error dB: law, d^-2, law and map; spread told dB")
     rows = []
     for out, flight in enumerate(flights):
         others = flights[:out] + flights[out + 1 :]
         fit, seen = fit_link(others), flight.means(2.0)
         plain = square_law([each.means(2.0) for each in others])
         errors = [seen.level - law.gain_db(seen.place) for law in (fit, plain)]
+        found, *_ = kriged(fit, station)
+        above = found.at(float(np.median(seen.place[:, 2]))) if found else None
+        errors.append(errors[0] - (above.value(*seen.place.T[:2]) if above else 0.0))
         rows.append([float(np.sqrt(np.mean(error**2))) for error in errors])
         law = f"n {fit.exponent:.2f}, {len(fit.elevation)} terms"
-        print(f"{flight.source}: {law}: {rows[-1][0]:.2f}, {rows[-1][1]:.2f}; {fit.spread:.2f}")
+        print(f"{flight.source}: {law}: {told(rows[-1])}; {fit.spread:.2f}")
     mean, worst = np.mean(rows, axis=0), np.max(rows, axis=0)
-    print(f"mean {mean[0]:.2f}, {mean[1]:.2f}; at most {worst[0]:.2f}, {worst[1]:.2f}")
+    print(f"mean {told(mean)}; at most {told(worst)}")
 
 
 if __name__ == "__main__":

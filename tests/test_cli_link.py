@@ -144,7 +144,11 @@ def test_terrain_tells_free_space_and_what_it_takes(tmp_path: Path) -> None:
     told = json.loads(link(*given, "--json"))
     assert told["origin"] == [*STATION[:2], pytest.approx(580, abs=1)]
     assert told["written"] == [str(out), str(tmp_path / "link.npz")]
-    assert 30 < told["most_loss_db"][0] < 60
+    low, high = told["losses"]
+    assert 30 < low["most_db"] < 60
+    assert 0.02 < low["below_ground"] < 0.2
+    assert low["most_db"] > high["most_db"] > 20
+    assert 0.1 < high["over_6_db"] <= low["over_6_db"] < 0.4
     plan = read_plan(small_plan(tmp_path, dict(zip(ORIGIN, (*STATION[:2], 570), strict=True))))
     found = plan.radio.gain.map
     assert found is not None

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,12 @@ from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.logs import read_log
 from faao_mav.optimizer.solution import Solution
+from faao_mav.radio.gain import PER_DB
 from faao_mav.radio.measured import SIK_STEP
 from faao_mav.report.summary import Line, beside
 from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
 from faao_mav.validate.words import counted
-from faao_mav.vector import lengths
 from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
 _SAME = 1e-5
@@ -156,10 +156,12 @@ class FromLog:
         told = np.isfinite(self.record.rssi) & (flight.t >= 0) & (flight.t < plan.flight.duration)
         if not told.any():
             return None
+        w, t = flight.w[told], flight.t[told]
+        links = zip(self.result.solution.problem.links, plan.radio.stations, strict=True)
         apart = [
             self.record.rssi[told] * SIK_STEP
-            - law.db(lengths(flight.w[told] - station.at(flight.t[told])), plan.flight.altitude)
-            for law, station in zip(plan.radio.path_gains, plan.radio.stations, strict=True)
+            - replace(link.gains, station=station.at(t)).log(w.T) / PER_DB
+            for link, station in links
         ]
         base, user = (float(np.std(each)) for each in apart)
         return {"levels": int(told.sum()), "base_station_db": base, "ground_user_db": user}

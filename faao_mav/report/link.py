@@ -128,27 +128,29 @@ def terrain_lines(found: GainMap, frequency: float) -> Iterator[Line]:
     """Yield free space at a `frequency`, MHz, and the map of what terrain takes."""
     yield "gain", f"{free_space_db(1e6 * frequency):.1f} - 20 log10 d dB, in free space"
     assert found.ground is not None
-    low, high = found.ground.min(), found.ground.max()
-    yield "ground", f"{low:.0f} to {high:.0f} m above the station's, at {found.origin[2]:.0f} m"
+    low, high = round(float(found.ground.min())), round(float(found.ground.max()))
+    yield "ground", f"{low} to {high} m above the station's, at {found.origin[2]:.0f} m"
     yield "map", f"{_extent(found)} ground"
-    for height, loss in zip(found.heights, -found.db, strict=True):
-        known = loss[~np.isnan(loss)]
-        told = f"{np.median(known):.1f} dB lost in the median, at most {known.max():.1f}"
-        lost = f"{np.mean(np.isnan(loss)):.0%} below ground"
-        yield f"at {height:g} m", f"{told}; {lost}" if len(known) else lost
+    for each in _losses(found):
+        told = f"{each['over_6_db']:.0%} of it loses over 6 dB, at most {each['most_db']:.1f}"
+        yield f"at {each['height']:g} m", f"{told}; {each['below_ground']:.0%} is below ground"
 
 
 def terrain_record(found: GainMap, frequency: float) -> dict[str, Any]:
-    """Return the JSON object of `--json`; losses are null where a height is below ground."""
-    losses = [-each[~np.isnan(each)] for each in found.db]
-    return {
-        "reference_gain_db": free_space_db(1e6 * frequency),
-        "exponent": 2.0,
-        "origin": found.origin,
-        "heights_m": found.heights.tolist(),
-        "median_loss_db": [float(np.median(each)) if len(each) else None for each in losses],
-        "most_loss_db": [float(each.max()) if len(each) else None for each in losses],
-    }
+    """Return the JSON object of `--json`."""
+    level = {"reference_gain_db": free_space_db(1e6 * frequency), "exponent": 2.0}
+    return level | {"origin": found.origin, "losses": list(_losses(found))}
+
+
+def _losses(found: GainMap) -> Iterator[dict[str, float]]:
+    """Yield for each height what is lost there, dB, and over which shares of the map."""
+    for height, db in zip(found.heights.tolist(), found.db, strict=True):
+        yield {
+            "height": height,
+            "over_6_db": float(np.mean(db < -6)),
+            "most_db": float(np.max(-db, where=~np.isnan(db), initial=0.0)),
+            "below_ground": float(np.mean(np.isnan(db))),
+        }
 
 
 def terrain_yaml(frequency: float, names: str) -> str:
