@@ -222,7 +222,11 @@ export default {
         return Array.from({ length: steps }, (_, i) => here.add(way.multiplyBy(i / steps)));
       });
       const edges = this.shapes?.flatMap(({ corners }) => (corners ? [[...corners, corners[0]]] : [])) ?? [];
-      const lines = [...this.lines, ...edges].flatMap(along);
+      const rims = this.shapes?.filter(({ center }) => center).flatMap(({ center, shape }) => {
+        const middle = on_screen(center), radius = on_screen([center[0], shape.getBounds().getEast()]).x - middle.x;
+        return Array.from({ length: 40 }, (_, k) => middle.add([radius * Math.cos(k * Math.PI / 20), radius * Math.sin(k * Math.PI / 20)]));
+      }) ?? [];
+      const lines = [...[...this.lines, ...edges].flatMap(along), ...rims];
       const marks = [...this.marks.getLayers(), ...this.route.getLayers()].filter((each) => each.options.title);
       const taken = marks.map((mark) => {
         const here = on_screen(mark.getLatLng());
