@@ -76,6 +76,8 @@ def route_map(
             plot.plot(*way.T, color=MUTED, linewidth=0.9, label="from and to home")
         numbers = _draw_items(plot, conversion.mission, frame, _WAYPOINTS, "waypoint")
         seen += [place[np.newaxis] for _, place in numbers]
+    if any(station.moves for station in plan.radio.stations):  # its way is drawn with its mark
+        plot.plot([], [], color=INK, linewidth=1.0, label="station moves")
     _show_all(plot, np.concatenate(seen), outlines)
     mark_stations(plot, list(zip(("base station", "user"), stations, "s^", strict=True)), numbers)
 

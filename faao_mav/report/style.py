@@ -200,6 +200,7 @@ def _drawn(axes: "Axes") -> Real:
 
     marks = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
     ways = [line.get_xydata() for line in axes.lines if line.get_linestyle() != "None"]
+    ways = [way for way in ways if np.size(way)]  # of a mere entry of the legend there is none
     for each in axes.collections:
         if isinstance(each, LineCollection):
             ways += each.get_segments()
