@@ -21,81 +21,54 @@ class Held:
     """Workers whose jobs are answered when the test says so."""
 
     def __init__(self) -> None:
-        self.jobs: list[tuple[str, str, asyncio.Future[Answer]]] = []
+        self.jobs: dict[str, asyncio.Future[Answer]] = {}
 
     async def short(self, work: Callable[..., Any], text: str, *_: Any) -> Answer:
-        self.jobs.append((work.__name__, text, asyncio.get_running_loop().create_future()))
-        return await self.jobs[-1][2]
+        job = f"{work.__name__} {text}"
+        self.jobs[job] = asyncio.get_running_loop().create_future()
+        return await self.jobs[job]
 
     long = short
 
-    async def answer(self, kind: str, text: str, answer: Answer | Exception | None = None) -> None:
+    async def answer(self, job: str, answer: Answer | Exception | None = None) -> None:
         await asyncio.sleep(0.001)
-        (future,) = [job for *asked, job in self.jobs if asked == [kind, text]]
         if isinstance(answer, Exception):
-            future.set_exception(answer)
+            self.jobs[job].set_exception(answer)
         else:
-            future.set_result(answer or Answer(refused=f"{kind} {text}"))
+            self.jobs[job].set_result(answer or Answer(refused=job))
         await asyncio.sleep(0.001)
 
-    def kinds(self) -> list[tuple[str, str]]:
-        return [(kind, text) for kind, text, job in self.jobs if not job.done()]
 
-
-@pytest.fixture
-def held(monkeypatch: pytest.MonkeyPatch) -> Held:
+def test_the_last_question_wins_and_what_goes_wrong_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(planner, "_REST", 0.0)
-    return Held()
+    held, shown = Held(), list[str]()
 
-
-def shown_by(held: Held, script: Callable[[Planner], Any]) -> list[str]:
-    shown: list[str] = []
-
-    async def run() -> None:
+    async def script() -> None:
         asked = Planner(held, lambda a: shown.append(a.refused or a.failed))  # type: ignore[arg-type]
-        await script(asked)
+        asked.ask("a", "p")
+        await held.answer("finished a")
+        await held.answer("rough a")  # after the finished one: not shown
+        asked.ask("b", "p")
+        await asyncio.sleep(0.001)
+        asked.ask("c", "p")
+        asked.ask("d", "p")  # a drag
+        await held.answer("rough b")  # of an older question, and the next is of the newest
+        await held.answer("finished d")
+        await held.answer("rough d")
+        assert all(job.done() for job in held.jobs.values())
+        asked.ask("e", "p")
+        await held.answer("rough e", ValueError("bug"))
+        await held.answer("finished e", ValueError("bug"))
+        asked.ask("f", "p")
+        await held.answer("rough f", Answer(failed="no flight, roughly"))
+        await held.answer("finished f", FaaoError("no flight"))
         asked.close()
 
-    asyncio.run(run())
-    return shown
-
-
-def test_a_rough_answer_after_the_finished_one_is_not_shown(held: Held) -> None:
-    async def script(asked: Planner) -> None:
-        asked.ask("a", "p")
-        await held.answer("finished", "a")
-        await held.answer("rough", "a")
-
-    assert shown_by(held, script) == ["finished a"]
-
-
-def test_a_drag_shows_rough_answers_and_the_finished_one_of_its_end(held: Held) -> None:
-    async def script(asked: Planner) -> None:
-        asked.ask("a", "p")
-        await asyncio.sleep(0.001)
-        asked.ask("b", "p")
-        asked.ask("c", "p")
-        await held.answer("rough", "a")  # of an older question, and the next is of the newest
-        await held.answer("finished", "c")
-        await held.answer("rough", "c")
-        assert held.kinds() == []
-        asked.ask("d", "p")
-        await held.answer("rough", "d")
-        await held.answer("finished", "d")
-
-    assert shown_by(held, script) == ["rough a", "finished c", "rough d", "finished d"]
-
-
-def test_a_question_that_goes_wrong_is_told_and_the_next_one_answered(held: Held) -> None:
-    async def script(asked: Planner) -> None:
-        asked.ask("a", "p")
-        await held.answer("rough", "a", ValueError("bug"))
-        await held.answer("finished", "a", ValueError("bug"))
-        asked.ask("b", "p")
-        await held.answer("rough", "b", Answer(failed="no flight, roughly"))
-        await held.answer("finished", "b", FaaoError("no flight"))
-
-    wrong, right = shown_by(held, script)
+    asyncio.run(script())
+    *answers, wrong, right = shown
+    assert answers == ["finished a", "rough b", "finished d"]
     assert "ValueError('bug')" in wrong
     assert right == "no flight"
 
