@@ -25,6 +25,9 @@ W, V, A = (0, 1), (2, 3), (4, 5)
 COMMON = 6
 """Unknowns of a slot without those that constraints bring."""
 
+ALLOWED = 1e-9
+"""The violation of a limit, in solver units, that counts as none: rounding of 1,000s of slots."""
+
 TINY = float(np.finfo(float).tiny)
 """The smallest normal number: keeps a quotient finite where its denominator may be zero."""
 

@@ -7,16 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import A, Constraint, V, every_excess, unknowns
+from faao_mav.optimizer.interior.constraint import ALLOWED, A, Constraint, V, every_excess, unknowns
 from faao_mav.optimizer.interior.queue import Queue
 from faao_mav.optimizer.interior.rewards import Rewards, Stage
 from faao_mav.optimizer.interior.search import COLD, SLOW, WARM, Search
 from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
-
-_ALLOWED = 1e-9
-"""The violation of a limit, relative to it, that a flight may have: rounding of 1,000s of slots."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +122,7 @@ def feasible(
     The share of `start` is the least of 0, 1e-9, 1e-8 ... 0.1 and 1 that will do.
     """
     kept = constraints_of(kin) if constraints is None else constraints
-    exact, allowed = kin.follow(v), max(_ALLOWED, every_excess(kin, kept, start))
+    exact, allowed = kin.follow(v), max(ALLOWED, every_excess(kin, kept, start))
     for share in (0.0, *10.0 ** np.arange(-9, 0)):
         mixed = (
             (1 - share) * own + share * other

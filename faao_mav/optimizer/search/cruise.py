@@ -7,7 +7,6 @@ for what time is left.
 """
 
 from collections.abc import Iterator, Sequence
-from itertools import product
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.interior.constraint import every_excess
 from faao_mav.optimizer.interior.maximize import constraints_of
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.search.track import MOST_STEPS, nearest_flight
+from faao_mav.optimizer.search.track import nearest_flight
 
 _TURN_SHARE = 0.95
 """Share of the largest acceleration that turns use; the rest is for meeting the ends. Chosen."""
@@ -42,9 +41,6 @@ _TOLERANCE = 1e-9
 
 _REPAIRS = 12
 """Curves at most that are brought within the limits, the least violation first. Chosen."""
-
-_FEW_STEPS = 30
-"""Steps that each of them is given before any has more: enough for most. Chosen."""
 
 _DRAWN_IN = 0.1
 """Share by which the path of a curve that breaks limits is drawn to its middle: chosen. A path that
@@ -85,9 +81,9 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
         if max(kin.residuals(flight).values()) < _TOLERANCE:
             return flight
         near.append((every_excess(kin, constraints_of(kin), flight), len(near), flight))
-    for steps, (_, _, flight) in product((_FEW_STEPS, MOST_STEPS), sorted(near)[:_REPAIRS]):
+    for _, _, flight in sorted(near)[:_REPAIRS]:
         drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
-        repaired = nearest_flight(kin, drawn_in, flight, steps=steps, first=True)
+        repaired = nearest_flight(kin, drawn_in, flight, first=True)
         if repaired is not None:
             return repaired
     return None

@@ -13,12 +13,12 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.fence_area import FreeArea
-from faao_mav.optimizer.interior.constraint import Constraint, every_excess
+from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, every_excess
 from faao_mav.optimizer.interior.energy import EnergyLimit
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.cruise import cruise_by
 from faao_mav.optimizer.search.straight import straight_flight, with_stops
-from faao_mav.optimizer.search.track import ALLOWED, nearest_flight
+from faao_mav.optimizer.search.track import nearest_flight
 
 BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
 """What `global` stands for: paths found over the map gained nothing beside these (44 random plans,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import Constraint, every_excess, unknowns
+from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, every_excess, unknowns
 from faao_mav.optimizer.interior.maximize import constraints_of
 from faao_mav.optimizer.interior.rewards import Rewards, StageValues
 from faao_mav.optimizer.interior.search import COLD, Search
@@ -20,10 +20,7 @@ from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 _TOLERANCE = 1e-4
 """Tolerance of the search: a start need not be the nearest flight to the last metre. Chosen."""
 
-ALLOWED = 1e-9
-"""The violation of a limit, in solver units, that counts as none: rounding."""
-
-MOST_STEPS = 200
+_MOST_STEPS = 200
 """Steps after which a search ends. Chosen."""
 
 _LOOK = 5
@@ -38,13 +35,11 @@ class Closeness:
     path: Real
 
     def __call__(self, w: Real) -> StageValues:
-        """Return the rewards at w (2, ..., n), m."""
-        away = (w - self.path.T.reshape(2, *[1] * (w.ndim - 2), -1))[:, None] / LENGTH
+        """Return the rewards at w (2, n), m."""
+        away = (w - self.path.T)[:, None] / LENGTH
         value = -(away * away).sum(axis=0)
-        hessian = np.broadcast_to(
-            np.array([-2.0, 0.0, -2.0]).reshape(3, *[1] * value.ndim), (3, *value.shape)
-        )
-        return StageValues(value, -2 * away / LENGTH, hessian / LENGTH**2)
+        hessian = np.reshape((-2.0, 0.0, -2.0), (3, 1, 1)) / LENGTH**2
+        return StageValues(value, -2 * away / LENGTH, np.broadcast_to(hessian, (3, *value.shape)))
 
 
 def nearest_flight(
@@ -52,14 +47,13 @@ def nearest_flight(
     path: Real,
     start: Trajectory,
     constraints: Sequence[Constraint] = (),
-    steps: int = MOST_STEPS,
     *,
     first: bool = False,
 ) -> Trajectory | None:
     """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
 
-    None where none is found within `steps` that keeps `constraints` too. `start` is any flight of
-    `kin`. With `first` the way there ends with a flight that keeps them.
+    None where none is found that keeps `constraints` too. `start` is any flight of `kin`. With
+    `first` the way there ends with a flight that keeps them.
     """
     for kept in ((), tuple(constraints)) if constraints else ((),):
         every = (*constraints_of(kin), *kept)
@@ -67,9 +61,9 @@ def nearest_flight(
         if rewards.flat:
             continue
         search = Search(kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
-        for most in range(_LOOK, steps + _LOOK, _LOOK) if first else (steps,):
+        for most in range(_LOOK, _MOST_STEPS + 1, _LOOK) if first else (_MOST_STEPS,):
             with np.errstate(all="ignore"):
-                converged = search.run(min(most, steps))
+                converged = search.run(most)
             start = kin.follow(search.v.T * kin.max_speed)
             if converged or (first and _keeps(kin, every, start)):
                 break
