@@ -16,7 +16,7 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command does
 
-from faao_mav import parse_plan, plan_mission
+from faao_mav import plan_mission, read_plan
 
 _SAMPLE = Path(__file__).resolve().parents[1] / "missions" / "copter_relay.yaml"
 
@@ -38,23 +38,14 @@ _SIZES = (
 )
 
 
-def text_of(size: str) -> str:
-    """Return the plan of a row: alphabet, antennas, fading and time step, s."""
-    modulation, antennas, fading, step = size.split()
-    text = _SAMPLE.read_text(encoding="utf-8")
-    for old, new in (
-        ("modulation: qpsk", f"modulation: {modulation}"),
-        ("antennas: 2", f"antennas: {antennas}"),
-        ("fading: ergodic", f"fading: {fading}"),
-        ("time_step: 0.5", f"time_step: {step}"),
-    ):
-        text = text.replace(old, new)
-    return text
-
-
 def measure(size: str) -> None:
-    """Print one row: what the plan takes, and R_del."""
-    plan = parse_plan(text_of(size))
+    """Print one row, of alphabet, antennas, fading and time step, s: what it takes, and R_del."""
+    modulation, antennas, fading, step = size.split()
+    ends = ("base_station", "relay", "ground_user")
+    plan = read_plan(_SAMPLE).changed(
+        {"radio.modulation": modulation, "radio.fading": fading, "flight.time_step": float(step)}
+        | {f"radio.{end}.antennas": int(antennas) for end in ends}
+    )
     result = plan_mission(plan)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     print(

@@ -15,8 +15,11 @@ from faao_mav.radio.constellation import DifferenceClasses
 from faao_mav.radio.quadratic_form import features
 from faao_mav.radio.square_sum import SquareSum
 
-_BLOCK, _CLASSES = 1 << 17, 2048
-"""Exponents in memory at once, 1 MB, and classes taken together: they stay in the cache. Chosen."""
+_BLOCK = 1 << 17
+"""Exponents in memory at once, 1 MB: they stay in the cache. Chosen."""
+
+_NEAREST = 2048
+"""Classes, the nearest first, among which the smallest exponent is looked for. Chosen."""
 
 _TINY = 1e-300
 """The least sum that is told from zero: s is above -691."""
@@ -56,7 +59,7 @@ class ClassSum:
 
     def least(self, z: Real) -> Real:
         """Return the smallest exponent of the nearest differences, (b,), at z (b, N²)."""
-        phi = self._phi[:_CLASSES].T
+        phi = self._phi[:_NEAREST].T
         step = max(1, _BLOCK // phi.shape[1])
         parts = [(z[i : i + step] @ phi).min(axis=1) for i in range(0, len(z), step)]
         return np.concatenate(parts)
@@ -65,14 +68,11 @@ class ClassSum:
         """Return the first `columns` of Σ_k weight_k e^-D_k [1, φ], (b, columns)."""
         if self._by_parts is not None:
             return self._by_parts.sums(z, columns)
-        sums = np.zeros((len(z), columns))
-        step = max(1, _BLOCK // min(_CLASSES, len(self._phi)))
-        for first in range(0, len(self._phi), _CLASSES):
-            phi = -self._phi[first : first + _CLASSES].T
-            terms = self._terms[first : first + _CLASSES, :columns]
-            for start in range(0, len(z), step):
-                D = z[start : start + step] @ phi
-                sums[start : start + step] += np.exp(D, out=D) @ terms
+        sums, phi = np.empty((len(z), columns)), -self._phi.T
+        step = max(1, _BLOCK // len(self._phi))
+        for start in range(0, len(z), step):
+            D = z[start : start + step] @ phi
+            sums[start : start + step] = np.exp(D, out=D) @ self._terms[:, :columns]
         return sums
 
 
