@@ -20,7 +20,7 @@ from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates.table_rate import TableRate
-from faao_mav.optimizer.search.starts import starts
+from faao_mav.optimizer.search.starts import points_along, starts
 from faao_mav.plan import Plan, read_plan
 from faao_mav.radio.gain import PathGain
 from faao_mav.radio.relay import RelayQueue
@@ -104,10 +104,7 @@ def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
 
 def _hurried(kin: Kinematics, stops: Sequence[Real]) -> Trajectory:
     """The way by `stops` at an even speed, whatever its limit is."""
-    corners = np.vstack([kin.start, *stops, kin.end])
-    gone = np.append(0, np.cumsum(np.hypot(*np.diff(corners, axis=0).T)))
-    at = np.linspace(0, gone[-1], kin.slots)
-    w = np.stack([np.interp(at, gone, each) for each in corners.T], axis=1)
+    w = points_along(np.vstack([kin.start, *stops, kin.end]), np.linspace(0, 1, kin.slots))
     v = np.gradient(w, kin.time_step, axis=0)
     a = np.vstack([np.diff(v, axis=0) / kin.time_step, np.zeros(2)])
     return Trajectory(w, v, a)

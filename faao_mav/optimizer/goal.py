@@ -49,8 +49,8 @@ _NEAR = 0.15
 """The share by which durations are tried on both sides of that of a near energy. Chosen."""
 
 _COMPARED = 50
-"""Durations of straight flights among which the thriftiest is looked for, and a tenth of airspeeds.
-Chosen."""
+"""Durations of straight flights among which the thriftiest is looked for, and a tenth of the
+airspeeds. Chosen."""
 
 _ABOVE = 1e-4
 """The share by which an energy is above what a flight takes that is a start. Chosen: ten times what
