@@ -11,7 +11,7 @@ take-off.
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
@@ -27,9 +27,6 @@ from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.follower import Follower
 from faao_mav.wire.messages import SetPositionTargetLocalNed
 
-Fly: TypeAlias = Callable[[Mission, Vehicle], Track]
-"""How a vehicle with the parameters that it has flies a mission."""
-
 _FIRST_DO = 176
 """The first command that is done at once; those before take time."""
 
@@ -40,9 +37,9 @@ _FARTHEST = 1e6
 class Flight:
     """What a mock autopilot's mode and motors are, and what it therefore does with its aircraft.
 
-    It flies missions along the track of `fly`, None: as predicted in the `wind`, m/s east and
-    north, and follows setpoints in GUIDED and Offboard. In another mode it returns, lands or holds
-    its place. `values` are its parameters. Times are seconds on its own clock.
+    It flies missions as predicted in the `wind`, m/s east and north, and follows setpoints in
+    GUIDED and Offboard. In another mode it returns, lands or holds its place. `values` are its
+    parameters. Times are seconds on its own clock.
     """
 
     def __init__(
@@ -50,13 +47,12 @@ class Flight:
         vehicle_type: VehicleType,
         values: Mapping[str, float],
         home: Home,
-        fly: Fly | None,
         wind: tuple[float, float],
     ) -> None:
         self._type, self._values = vehicle_type, values
         self._frame = LocalFrame(home.latitude, home.longitude)
         self._own_frame = vehicle_type.family.local_frame(home.latitude, home.longitude)
-        self._fly = fly or partial(predict, wind=wind)
+        self._fly: Callable[[Mission, Vehicle], Track] = partial(predict, wind=wind)
         self.modes, self.rules = vehicle_type.modes, vehicle_type.family.setpoints
         self.mode = self.asked_mode = self.modes.rest
         self.aircraft = Follower(wind)

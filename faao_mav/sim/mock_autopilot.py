@@ -12,7 +12,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.behaviour import Behaviour, whole
-from faao_mav.sim.flight import Flight, Fly
+from faao_mav.sim.flight import Flight
 from faao_mav.sim.follower import Posture
 from faao_mav.sim.lists import StoredLists
 from faao_mav.sim.parameter_protocol import ParameterServer
@@ -39,7 +39,7 @@ _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
 
 
 class MockAutopilot(Machine[None]):
-    """It takes missions as ArduPilot or PX4 does, and flies them as predicted or as `fly` says.
+    """It takes missions as ArduPilot or PX4 does, and flies them as predicted.
 
     `aircraft` is what its heartbeats say that it is, and whose missions it stores.
     It boots for `boot` seconds, in which it refuses lists, and then knows after `place` seconds
@@ -63,7 +63,6 @@ class MockAutopilot(Machine[None]):
         aircraft: str = "copter",
         address: Address = Address(1, 1),  # noqa: B008
         home: Home = Home(-35.363262, 149.165237, 584.0),  # noqa: B008
-        fly: Fly | None = None,
         parameters: Mapping[str, float] | None = None,
         speedup: float = 1.0,
         rate: float = 4.0,
@@ -81,7 +80,7 @@ class MockAutopilot(Machine[None]):
             known |= dict(failsafe.defaults)
         known |= behaviour.parameters
         self.parameters = ParameterServer(known, parameters or {}, self.vehicle)
-        self.flight = Flight(self.vehicle, self.parameters.values, home, fly, wind)
+        self.flight = Flight(self.vehicle, self.parameters.values, home, wind)
         self.lists = StoredLists(
             self.vehicle, home, behaviour, self._is_ready, lambda: self.flight.on_mission
         )

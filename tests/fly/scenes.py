@@ -7,7 +7,7 @@ from typing import Any, TypeAlias, cast
 
 import numpy as np
 from conftest import FLYABLE, edited
-from mock_flights import fly
+from simple_flight import fly
 from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
 
@@ -158,7 +158,8 @@ class Scene:
         behaviour = behaviour_of(cast(MockKind, kind))
         if solution is not None:
             options["parameters"] = {"GUID_TIMEOUT": 1.0} | dict(options.get("parameters") or {})
-        self.mock: Any = MockAutopilot(behaviour, fly=fly, **{"home": HOME, **options})
+        self.mock: Any = MockAutopilot(behaviour, **{"home": HOME, **options})
+        self.mock.flight._fly = fly
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 from conftest import free_port
-from mock_flights import fly
 from scenes import away
 from served import running
 from stations import FENCE, HOME, RALLY, a_mission
@@ -31,7 +30,7 @@ def to(request: pytest.FixtureRequest) -> str:
 
 def vehicle(to: str, kind: Any = "ardupilot", **options: Any) -> Any:
     """Return a mock autopilot that runs at `to` for as long as a `with` block lasts."""
-    settings: dict[str, Any] = {"home": HOME, "fly": fly, "beat": 0.1, "speedup": 60.0} | options
+    settings: dict[str, Any] = {"home": HOME, "beat": 0.1, "speedup": 60.0} | options
     listen = to.replace("udpout", "udpin")
     return running(MockAutopilot(behaviour_of(kind), **settings), listen)
 

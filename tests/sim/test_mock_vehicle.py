@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 import pytest
-from mock_flights import fly
 from stations import HOME, VEHICLE, Desk, a_mission, vehicle_of
 
 from faao_mav.autopilot.ardupilot import ARDUPILOT
@@ -43,7 +42,7 @@ STILL = SetPositionTargetLocalNed(VEHICLE, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 
 
 
 def desk_for(kind: MockKind, mission: Mission | None = None, **options: Any) -> Desk:
-    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, **options)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, **options)
     desk = Desk(mock, GROUND_STATION)
     desk.start()
     for part in MissionType:
@@ -95,7 +94,8 @@ def test_a_whole_flight(kind: MockKind) -> None:
     told = [first, *range(first + 2, first + 13)]
     assert [message.seq for message in only(out, MissionItemReached)] == told
     heights = [message.relative_alt / 1000 for message in only(out, GlobalPositionInt)]
-    assert max(heights) == pytest.approx(30.0, abs=0.1)
+    returns = {"ardupilot": 30.0, "px4": 60.0}[kind]  # RTL_RETURN_ALT
+    assert max(heights) == pytest.approx(returns, abs=0.1)
     assert heights[-1] == 0
     currents = [message.seq for message in only(out, MissionCurrent)]
     assert currents == sorted(currents)

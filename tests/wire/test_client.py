@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 from conftest import free_port
-from mock_flights import fly
 from pymavlink import mavutil
 from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
@@ -34,7 +33,7 @@ def port() -> int:
 
 def mock_of(kind: MockKind | Behaviour, **options: Any) -> MockAutopilot:
     behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(behaviour, home=HOME, fly=fly, beat=0.1, **options)
+    return MockAutopilot(behaviour, home=HOME, beat=0.1, **options)
 
 
 @BOTH

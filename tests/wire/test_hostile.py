@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 from conftest import PATIENCE, free_port
-from mock_flights import fly
 from served import running
 from stations import FENCE, HOME, VEHICLE, Air, Desk, a_mission, mock_of, rows_for, vehicle_of
 from typer.testing import CliRunner
@@ -186,7 +185,7 @@ def test_a_mission_goes_on_when_nobody_can_be_told_any_more(gone: str, tmp_path:
                 orders.append(message.command)
             return super()._receive(envelope, now)
 
-    mock = Told(behaviour_of("ardupilot"), home=HOME, beat=0.1, fly=fly)
+    mock = Told(behaviour_of("ardupilot"), home=HOME, beat=0.1)
     port = free_port()
     to = f"udpout:127.0.0.1:{port}"
     heard = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # nohup ignores it

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mock_flights import fly as flies
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 from scenes import Scene
@@ -40,7 +39,7 @@ HERE, ELSEWHERE = "192.0.2.1:14550", "192.0.2.7:14550"
 
 def a_mock(system: int = 1, **options: Any) -> MockAutopilot:
     behaviour, address = behaviour_of("ardupilot"), Address(system, 1)
-    return MockAutopilot(behaviour, home=HOME, fly=flies, address=address, beat=0.1, **options)
+    return MockAutopilot(behaviour, home=HOME, address=address, beat=0.1, **options)
 
 
 # ---- which component is the autopilot

@@ -14,7 +14,6 @@ from mavsdk.plugins.action import Action
 from mavsdk.plugins.mission_raw import MissionItem as SdkItem
 from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.mission_raw_server import MissionRawServer
-from mock_flights import fly
 from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places
 
@@ -49,7 +48,7 @@ def found_places(items: list[SdkItem]) -> list[tuple[int, int, int, float]]:
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 def test_mavsdk_uploads_downloads_clears_and_flies(kind: MockKind) -> None:
     port, reached = free_port(), threading.Event()
-    mock = MockAutopilot(behaviour_of(kind), home=HOME, fly=fly, beat=0.1, speedup=40.0)
+    mock = MockAutopilot(behaviour_of(kind), home=HOME, beat=0.1, speedup=40.0)
     mission = a_mission(8, fence=FENCE, rally=RALLY)
     rows, fence, rally = (wire_items(mission, part, mock.vehicle) for part in MissionType)
     with (

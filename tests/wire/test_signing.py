@@ -11,7 +11,6 @@ import pytest
 from conftest import free_port
 from hypothesis import given
 from hypothesis import strategies as st
-from mock_flights import fly
 from pymavlink.dialects.v20 import common
 from served import running
 from stations import HOME, VEHICLE, Air, a_mission, hurry, signing_key
@@ -48,7 +47,7 @@ def signed(at: float = NOW, key: bytes = KEY) -> bytes:
 
 
 def mock() -> MockAutopilot:
-    return MockAutopilot(behaviour_of("px4"), home=HOME, fly=fly, beat=0.1, rate=0.0)
+    return MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1, rate=0.0)
 
 
 def test_signed_packets_need_the_key() -> None:
