@@ -26,15 +26,6 @@ def lean_acceleration(angle: float) -> float:
     return GRAVITY * math.tan(angle)
 
 
-def custom_mode(mode: int) -> tuple[float, float, float]:
-    """Return the first parameters of DO_SET_MODE for a custom `mode`: that it is one, and which.
-
-    >>> custom_mode(17)
-    (1.0, 17.0, 0.0)
-    """
-    return 1.0, float(mode), 0.0
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class AutopilotFamily:
     """An autopilot, whatever it flies."""
@@ -49,8 +40,7 @@ class AutopilotFamily:
     parameter_prefixes: tuple[str, ...]
     # How it takes and gives lists; those of one that is not known by default
     manners: Manners = field(default_factory=Manners)
-    # The first three parameters of DO_SET_MODE for one of its custom modes
-    mode_parameters: Callable[[int], tuple[float, float, float]] = custom_mode
+    has_submodes: bool = False  # Its custom modes are told as main and sub mode, bytes 2 and 3
     setpoints: SetpointRules = field(default_factory=SetpointRules)  # How it is flown by setpoints
     earth_radius: float | None = None  # Of the sphere of its local frame, m; None: WGS84
     # Whole numbers among its parameters are sent as their 32 bits, and only what is sent with the
@@ -59,6 +49,15 @@ class AutopilotFamily:
     mavlink_2: str = ""  # The parameter and its value with which a port speaks MAVLink 2
     # What may be why it does not answer, and what to do; "": nothing is known
     only_one_station: str = ""
+
+    def mode_parameters(self, mode: int) -> tuple[float, float, float]:
+        """Return the first parameters of DO_SET_MODE for a custom `mode`: that it is one, which.
+
+        >>> AutopilotFamily("a", "A", 3, "", "list", ()).mode_parameters(17)
+        (1.0, 17.0, 0.0)
+        """
+        main, sub = (mode >> 16 & 255, mode >> 24) if self.has_submodes else (mode, 0)
+        return 1.0, float(main), float(sub)
 
     def local_frame(self, latitude: float, longitude: float) -> LocalFrame:
         """Return the frame in which it takes setpoints, about its origin in degrees."""

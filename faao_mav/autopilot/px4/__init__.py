@@ -34,15 +34,6 @@ def px4_mode(main: int, sub: int) -> int:
     return main << 16 | sub << 24 if 0 <= main < 256 and 0 <= sub < 256 else 0
 
 
-def _mode_parameters(mode: int) -> tuple[float, float, float]:
-    """PX4 is told main and sub mode apart.
-
-    >>> _mode_parameters(px4_mode(4, 3))
-    (1.0, 4.0, 3.0)
-    """
-    return 1.0, float(mode >> 16 & 255), float(mode >> 24)
-
-
 _HOLD, _RETURN, _LAND = (px4_mode(4, sub) for sub in (3, 5, 6))
 
 PX4 = AutopilotFamily(
@@ -65,7 +56,7 @@ PX4 = AutopilotFamily(
             "INVALID": "this kind of list is unknown to it",
         },
     ),
-    mode_parameters=_mode_parameters,
+    has_submodes=True,
     setpoints=SetpointRules(
         "COM_OF_LOSS_T",
         most_timeout=60.0,  # the greatest value that it takes
