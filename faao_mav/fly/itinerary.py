@@ -1,5 +1,6 @@
 """A streamed flight from the ground to its end: which setpoint is due where and when."""
 
+import math
 from collections.abc import Callable
 from typing import Literal, TypeAlias
 
@@ -69,11 +70,13 @@ class Itinerary:
             )
         way_out(plan, first[:2])  # raises
         home = np.vstack([last[:2], way_home(plan, last[:2])])
-        self._ends = {"out": first, "back": self._high(home)[-1]}
+        self._ends = {"out": first, "back": np.append(home[-1], plan.flight.altitude)}
+        calm = plan.max_airspeed - plan.site.wind.speed
+        self._speed = max(_LEAST, min(plan.vehicle.max_speed, calm))
         self.part: Part = "take-off"
         self.relay_start: float | None = None
         self.trouble: str | None = None
-        self._time: float | None = None
+        self._time = math.nan
         self._led, self._meets = False, 0.0
         self._follow(None, 0.0)
 
@@ -82,25 +85,25 @@ class Itinerary:
 
         `velocity` (3,) is in m/s; all are east, north and up of the plan's origin.
         """
-        passed = 0.0 if self._time is None else t - self._time
-        self._time = t
+        passed, self._time = 0.0 if math.isnan(self._time) else t - self._time, t
         low = place[2] < self._plan.flight.altitude - _BELOW
+        late = self._arrived is not None and t >= self._arrived + _UNSETTLED
         match self.part:
             case "take-off" if self._takes_off and (low or abs(velocity[2]) >= _LEVEL):
                 return None
             case "take-off":
                 self._enter("out", t, place)
-            case "out" if self._rests(t, place, velocity):
+            case "out" if self._rests(t, place, velocity) or late:
                 self.relay_start = t - self.relay.begin
                 self._enter("relay", t, place)
             case "relay" if self._plans(t) >= max(self.relay.end, self._plan.flight.duration):
                 self._enter("back", t, self.relay.p[-1])
             case "back" if self._arrived is not None and (
-                np.linalg.norm(place - self._ends["back"]) <= NEAR or self._is_late(t)
+                late or np.linalg.norm(place - self._ends["back"]) <= NEAR
             ):
                 self.part = "over"
                 self._tell(_TOLD["over"])
-        return self._on_plan(t, place) or self._on_way(t, place, passed)
+        return self._followed(t, place, passed) or self._led_back(t, place)
 
     def _plans(self, t: float) -> float:
         """Return what the plan's clock reads at `t`, s."""
@@ -116,45 +119,41 @@ class Itinerary:
 
     def _follow(self, way: Course | None, t: float) -> None:
         """Follow `way` from its beginning; None: the plan."""
-        self._course, self._gone = way, 0.0
+        self._way, self._gone = way, 0.0
         self._settled: float | None = None
         self._arrived: float | None = None
         if not self._led:
             self._until = t + _STUCK + (0.0 if way is None else 2 * way.end)
 
-    def _on_plan(self, t: float, place: Real) -> Setpoint | None:
-        """Return where the plan has it at `t`; None where it may not be sent there."""
-        if self.part != "relay":
-            return None
-        setpoint = self.relay.at(self._plans(t))
-        if not self._gate.passes(t, place, setpoint):
-            return None
-        self._led = False
-        if self._course is not None:
-            self._tell("it is on its plan again")
-            self._follow(None, t)
-        return setpoint
+    def _followed(self, t: float, place: Real, passed: float) -> Setpoint | None:
+        """Return where the plan has it at `t`, or else its way, on which it is `passed` s later.
 
-    def _on_way(self, t: float, place: Real, passed: float) -> Setpoint | None:
-        """Return where it is to be on its way, `passed` s later than before, or on a new one."""
-        way, ahead = self._course, self._gone + passed
-        missed = self.part == "relay" and self._plans(t) > self._meets + _MISSED
-        if way is not None and not missed:
-            if self._gate.passes(t, place, way.at(ahead)):
-                self._gone = ahead
-                if ahead >= way.end:
-                    self._arrived, self._led = self._arrived or t, False
-                return way.at(ahead)
-            waiting = at_rest(way.at(self._gone).position)
-            if t < self._until and self._gate.passes(t, place, waiting):
-                return waiting
-        return self._led_back(t, place)
+        Where it may not be sent on, it waits on its way; None where it may not be sent there.
+        """
+        if self.part == "relay":
+            setpoint = self.relay.at(self._plans(t))
+            if self._gate.passes(t, place, setpoint):
+                self._led = False
+                if self._way is not None:
+                    self._tell("it is on its plan again")
+                    self._follow(None, t)
+                return setpoint
+        way, ahead = self._way, self._gone + passed
+        if way is None or (self.part == "relay" and self._plans(t) > self._meets + _MISSED):
+            return None
+        if self._gate.passes(t, place, way.at(ahead)):
+            self._gone = ahead
+            if ahead >= way.end:
+                self._arrived, self._led = self._arrived or t, False
+            return way.at(ahead)
+        waiting = at_rest(way.at(self._gone).position)
+        return waiting if t < self._until and self._gate.passes(t, place, waiting) else None
 
     def _led_back(self, t: float, place: Real) -> Setpoint | None:
         """Return the beginning of a new way to the present part; None, and why, without one."""
         if place[2] < _GROUNDED:
             self.trouble = "it has come down to the ground"
-        elif self._course is not None and t >= self._until and self._arrived is None:
+        elif self._way is not None and t >= self._until and self._arrived is None:
             self.trouble = "it does not follow"
         elif (way := self._leading(t, place)) is None:
             self.trouble = "no way inside the fence leads it back"
@@ -183,37 +182,24 @@ class Itinerary:
         self._meets = self.relay.end
         return self._way_to(place, self.relay.p[-1])
 
-    def _high(self, corners: Real) -> Real:
-        """Return `corners` (k, 2) at the plan's height."""
-        return np.column_stack([corners, np.full(len(corners), self._plan.flight.altitude)])
-
     def _way_to(self, place: Real, end: Real) -> Course | None:
         """Return the way from `place` (3,) to `end` (3,) inside the fence; None: there is none.
 
-        It leads up or down to the plan's height first.
+        It leads up or down to the plan's height first, at the plan's speed then, or at what the
+        wind leaves of it.
         """
         corners = way_between(self._plan, place[:2], end[:2])
         if corners is None:
             return None
+        high = np.column_stack([corners, np.full(len(corners), self._plan.flight.altitude)])
         limits = self._speed, self._plan.vehicle.max_acceleration
-        places = np.vstack([place, self._high(corners)])
-        return Course.through(places, [CLIMB, *[limits] * (len(corners) - 1)])
-
-    @property
-    def _speed(self) -> float:
-        """The speed of ways, m/s: the plan's, or what the wind leaves of it."""
-        calm = self._plan.max_airspeed - self._plan.site.wind.speed
-        return max(_LEAST, min(self._plan.vehicle.max_speed, calm))
+        return Course.through(np.vstack([place, high]), [CLIMB, *[limits] * (len(corners) - 1)])
 
     def _rests(self, t: float, place: Real, velocity: Real) -> bool:
-        """Tell whether the aircraft rests where the relay flight begins, or takes too long."""
+        """Tell whether the aircraft rests where the relay flight begins."""
         away, speed = np.linalg.norm(place - self._ends["out"]), np.linalg.norm(velocity)
         if self._arrived is None or away > _SETTLED or speed > _STILL:
             self._settled = None
-        else:
-            self._settled = self._settled or t
-        return (self._settled is not None and t >= self._settled + _REST) or self._is_late(t)
-
-    def _is_late(self, t: float) -> bool:
-        """Tell whether it has been at the end of its way for longer than it should take."""
-        return self._arrived is not None and t >= self._arrived + _UNSETTLED
+            return False
+        self._settled = self._settled or t
+        return t >= self._settled + _REST
