@@ -1,13 +1,20 @@
 """What a vehicle does by itself when a link, its battery or its position is lost: `failsafes.tsv`.
 
-A row of the table is one stage of what a vehicle does about a loss. Its columns, "-" for nothing:
-the vehicle and the loss; `defaults`, the parameters of the stage with the autopilot's defaults (a
-whole number is one of 32 bits on PX4's wire), and `absent`, those that count in versions without
-the parameter; `off`, values with which it does nothing; `flies on by`, a parameter and its bits in
-a mission and in a flight by setpoints by which it flies on; `decides`, the parameter whose values
-from 1 on have what it `does`, apart by bars ("": not known; names in braces stand for values), and
-`idle` those with which it does nothing; `after` whose seconds it acts, `below` which limits, of
-which 0 is none, and `when`, in words.
+A row of the table is one stage of what a vehicle does about a loss. Columns, "-" for nothing:
+
+- `vehicle`, `loss`
+- `defaults`: the parameters that decide, with the autopilot's defaults; a whole number is one of 32
+  bits on PX4's wire
+- `absent`: the values that count in versions without the parameter
+- `off`: a parameter, and the values with which nothing is done
+- `flies on by`: a parameter, and its bits in a mission and in a flight by setpoints, with which the
+  vehicle flies on
+- `decides`, `does`: a parameter, and what is done by its values from 1 on, between bars; "" where
+  that is not known; names in braces stand for the values of parameters
+- `idle`: values of `decides` with which nothing is done, or the mission goes on
+- `after`: the parameter that says after how many seconds
+- `below`: the parameters below which it acts, with their units; with 0 it does not
+- `when`: when that is, as the beginning of what is done
 
 Sources: ArduPilot's lists of parameters and events of Copter and Plane 4.1 to 4.7; PX4 1.14 to
 1.16: parameter reference, and the module commander (behaviour of its failsafes).
@@ -18,6 +25,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import NamedTuple, TypeAlias
 
 Values: TypeAlias = Mapping[str, float]
@@ -94,14 +102,17 @@ def _told(stage: Mapping[str, str], values: Values) -> Response:
     return Response(f"{when}{text}{' at ' * bool(limits)}{' or '.join(limits)}", acts)
 
 
+_TABLE = files("faao_mav.autopilot").joinpath("failsafes.tsv")
+
+
 @cache
-def failsafes(vehicle: str) -> tuple[Failsafe, ...]:
-    """Return what the `vehicle` of the table does, loss by loss.
+def failsafes(vehicle: str, table: Traversable = _TABLE) -> tuple[Failsafe, ...]:
+    """Return what the `vehicle` of a `table` does, loss by loss.
 
     >>> [each.loss for each in failsafes("arduplane")]
     ['RC lost', 'ground station lost', 'battery low']
     """
-    text = files("faao_mav.autopilot").joinpath("failsafes.tsv").read_text(encoding="utf-8")
+    text = table.read_text(encoding="utf-8")
     found: dict[str, list[dict[str, str]]] = {}
     for row in csv.DictReader(text.splitlines(), delimiter="\t"):
         if row["vehicle"] == vehicle:
