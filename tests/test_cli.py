@@ -81,8 +81,13 @@ def test_one_pass_through_every_command(plan: Path, out: Path, tmp_path: Path) -
     assert told["predicted"]["rms_position_error"] <= told["predicted"]["max_position_error"]
     assert {"rule", "item", "level", "message", "action"} <= told["validation"][0].keys()
     with np.load(save) as archive:
+        promised = "t w v a P_B P_U H_rB H_rU I_U I_G received forwarded queue R_avg R_U R_G"
+        assert {*promised.split(), "history", "plan"} < {*archive}
         assert archive["w"].shape == (32, 2)
         assert archive["predicted_t"].shape == archive["predicted_w"].shape[:1]
+        come, gone, waiting = (archive[name] for name in ("received", "forwarded", "queue"))
+        assert archive["R_del"] == told["delivered_rate"] == pytest.approx(gone.mean())
+    assert np.diff(waiting) == pytest.approx((come - gone)[:-1], abs=1e-12)
     parameters = read_parameters(out.with_suffix(".param"))
     assert parameters["WPNAV_ACCEL"] == pytest.approx(100 * parameters["WP_ACC"])
     names = {path.name for path in (plan, out, save, page, figure, table)} | {"m.param"}
