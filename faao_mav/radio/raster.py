@@ -54,7 +54,7 @@ class Raster:
         off = np.abs(2 * row - rows + 1) > rows
         return np.where(off | (np.abs(2 * column - columns + 1) > columns), np.nan, found)
 
-    def local(self) -> tuple[Real, Real, Real, tuple[float, float]]:
+    def local(self) -> tuple[Real, Real, Real, Real]:
         """Return the raster over local metres about its middle, as many steps each way.
 
         That is east (k,), north (m,), values (m, k), latitude and longitude of the middle.
@@ -66,7 +66,8 @@ class Raster:
         x, y = frame.to_local(*self.place(*corners)[::-1]).T
         east, north = np.linspace(x.min(), x.max(), columns), np.linspace(y.min(), y.max(), rows)
         grid = np.stack(np.meshgrid(east, north), axis=-1)
-        return east, north, self.at(*frame.to_geodetic(grid)), (frame.latitude, frame.longitude)
+        middle = np.array([frame.latitude, frame.longitude])
+        return east, north, self.at(*frame.to_geodetic(grid)), middle
 
 
 def read_raster(path: str | Path, what: str, most: int) -> Raster:
