@@ -62,7 +62,8 @@ class StoredLists:
 
     def reset(self) -> None:
         """Forget what is under way, as a reboot does."""
-        self._transfers: dict[MissionType, _Transfer] = {}
+        self._transfers: dict[MissionType | None, _Transfer] = {}
+        """What is under way, by its list; under None where there is one transfer only."""
         self._whole: tuple[Address, MissionType, int] | None = None
         """The transfer that has ended with all items: with whom, of what, and how many."""
 
@@ -119,8 +120,8 @@ class StoredLists:
         if not parts:
             is_ack = isinstance(message, messages.MissionAck)
             return [] if is_ack else _ack(sender, given, MavResult.UNSUPPORTED)
-        part, only = parts[0], next(iter(self._transfers.values()), None)
-        under_way = only if self._alone else self._transfers.get(part)
+        part = parts[0]
+        under_way = self._transfers.get(self._slot(part))
         match message:
             case messages.MissionCount(count=count):
                 return self._on_count(sender, part, count, under_way)
@@ -139,6 +140,9 @@ class StoredLists:
             case messages.MissionClearAll():
                 return self._clear(sender, given, parts)
         return []
+
+    def _slot(self, part: MissionType) -> MissionType | None:
+        return None if self._alone else part
 
     def _on_count(
         self, sender: Address, part: MissionType, count: int, under_way: _Transfer | None
@@ -161,8 +165,8 @@ class StoredLists:
             return self._clear(sender, part, [part])
         if self._in_place(part):
             self.replace(part, self.items(part)[:count])
-        self._transfers[part] = _Transfer(sender, part, count, self._now)
-        return self._ask(self._transfers[part])
+        self._transfers[self._slot(part)] = upload = _Transfer(sender, part, count, self._now)
+        return self._ask(upload)
 
     def _on_item(
         self, sender: Address, message: messages.MissionItemInt, upload: _Transfer | None
@@ -200,19 +204,14 @@ class StoredLists:
         self, sender: Address, part: MissionType, under_way: _Transfer | None
     ) -> list[Message]:
         items = self.items(part)
+        if under_way is not None:
+            given = under_way.sending and under_way.passed == under_way.count
+            again = under_way.sending and (sender, part) == (under_way.partner, under_way.part)
+            if not (given or again):
+                return [] if self._alone else _ack(sender, part, self._busy)
         if self._alone:
-            if under_way is not None and not (
-                under_way.sending
-                and (
-                    under_way.passed == under_way.count
-                    or (sender, part) == (under_way.partner, under_way.part)
-                )
-            ):
-                return []
             sending = _Transfer(sender, part, len(items), self._now, sending=True, items=items)
-            self._transfers = {part: sending}
-        elif under_way is not None:
-            return _ack(sender, part, self._busy)
+            self._transfers[None] = sending
         return [messages.MissionCount(sender, part, len(items), self.number(part))]
 
     def _on_request(
@@ -221,9 +220,8 @@ class StoredLists:
         part, seq = MissionType(request.mission_type), request.seq
         items = self.items(part)
         if self._alone:
-            if under_way is None or not under_way.sending:
-                return []
-            if (sender, part) != (under_way.partner, under_way.part):
+            ours = under_way is not None and (sender, part) == (under_way.partner, under_way.part)
+            if under_way is None or not ours or not under_way.sending:
                 return []
             if seq not in (under_way.passed, under_way.passed - 1) or seq == under_way.count:
                 return self._end(under_way, MavResult.ERROR)
@@ -245,7 +243,7 @@ class StoredLists:
 
     def _clear(self, sender: Address, given: int, parts: Iterable[MissionType]) -> list[Message]:
         for part in parts:
-            self._transfers.pop(part, None)
+            self._transfers.pop(self._slot(part), None)
             self.replace(part, ())
         return _ack(sender, given, MavResult.ACCEPTED)
 
@@ -255,7 +253,7 @@ class StoredLists:
         return [messages.MissionRequestInt(upload.partner, part, seq, self._legacy)]
 
     def _end(self, transfer: _Transfer, result: MavResult) -> list[Message]:
-        del self._transfers[transfer.part]
+        del self._transfers[self._slot(transfer.part)]
         whole = transfer.passed == transfer.count
         self._whole = (transfer.partner, transfer.part, transfer.count) if whole else None
         number = self.number(transfer.part) if result == MavResult.ACCEPTED else 0
