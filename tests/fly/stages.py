@@ -1,5 +1,6 @@
 """A scene of the mock as a row of words sets it up: see `test_scenes.py` for the words."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -24,7 +25,13 @@ from stations import FOREIGN, HOME, RALLY, a_mission, rows_for, vehicle_of
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
-from faao_mav.wire.messages import CommandAck, GlobalPositionInt, Message, MissionCurrent
+from faao_mav.wire.messages import (
+    CommandAck,
+    Envelope,
+    GlobalPositionInt,
+    Message,
+    MissionCurrent,
+)
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
 
@@ -90,10 +97,7 @@ class Stage:
         if "stays-armed" in given:
             self.scene.mock.flight.aircraft.landed = lambda _: False
         if "refuses" in given:
-            on, denial = self.scene.mock.on, CommandAck(GROUND_STATION, MavCommand.START, 4)
-            self.scene.mock.on = lambda envelope, now: (
-                [denial] if starts(envelope.message) else on(envelope, now)
-            )
+            self._denies(starts, MavCommand.START)
         silences = []
         for when, *words in map(str.split, filter(None, happens.split("; "))):
             begin, end = (float(each) for each in (when.split("-") * 2)[:2])
@@ -111,7 +115,7 @@ class Stage:
             elif words == ["lag"]:
                 self._lags()
             elif words == ["unready"]:
-                self._denies_arming(end)
+                self._denies(PICKED["arm"], MavCommand.ARM, end)
             elif words[0] in ("station", "twin", "companion"):
                 address = {"station": FOREIGN, "companion": Address(1, 191)}.get(
                     words[0], GROUND_STATION
@@ -160,9 +164,17 @@ class Stage:
 
         self.scene.tells(late)
 
-    def _denies_arming(self, until: float) -> None:
-        mock, arm = self.scene.mock, self.scene.mock._arm
-        mock._arm = lambda wanted, now: 4 if wanted and now < until else arm(wanted, now)
+    def _denies(
+        self, picked: Callable[[Message], bool], command: int, until: float = math.inf
+    ) -> None:
+        on, denial = self.scene.mock.on, CommandAck(GROUND_STATION, command, 4)
+
+        def hear(envelope: Envelope, now: float) -> Sequence[Message]:
+            denied = picked(envelope.message) and now < until
+            answers: Sequence[Message] = [denial] if denied else on(envelope, now)
+            return answers
+
+        self.scene.mock.on = hear
 
     def _event(self, word: str, number: str = "0") -> Any:
         scene, mock = self.scene, self.scene.mock
