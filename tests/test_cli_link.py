@@ -173,6 +173,7 @@ FLAT = ("--terrain", "N47E008.hgt", "--station", PLACE)
         ([*FLAT, "--frequency", "900", "--heights", "60,40"], "--heights 60,40: expected metres"),
         ([*FLAT, "--frequency", "900", "--heights", "60,x"], "--heights 60,x: expected metres"),
         ([*FLAT, "--frequency", "900"], "N47E008.hgt: cannot be read"),
+        ([*FLAT, "--report", "a.html"], "--report: is about logs"),
         ([*FLAT, "--map", "m.npz"], "--map: give --out, the file that names it"),
         (
             [*FLAT, "--map", "m.csv", "--out", "a.yaml"],

@@ -132,6 +132,8 @@ def link(
     if bool(logs) == bool(terrain):
         raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
     if terrain:
+        if report is not None:
+            raise InputError("--report: is about logs; leave it out with --terrain")
         size = clutter, radius, spacing
         _over_terrain(terrain, place, frequency, heights, size, out, map_file, as_json)
         return

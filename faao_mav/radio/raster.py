@@ -49,10 +49,11 @@ class Raster:
         from scipy.ndimage import map_coordinates
 
         row, column = self.cell(longitude, latitude)
-        found = map_coordinates(self.values, [row, column], order=1, mode="nearest")
         rows, columns = self.values.shape
-        off = np.abs(2 * row - rows + 1) > rows
-        return np.where(off | (np.abs(2 * column - columns + 1) > columns), np.nan, found)
+        on = (np.abs(2 * row - rows + 1) <= rows) & (np.abs(2 * column - columns + 1) <= columns)
+        at = np.where(on, row, 0.0), np.where(on, column, 0.0)
+        found = map_coordinates(self.values, at, order=1, mode="nearest")
+        return np.where(on, found, np.nan)
 
     def local(self) -> tuple[Real, Real, Real, Real]:
         """Return the raster over local metres about its middle, as many steps each way.
@@ -98,11 +99,11 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
             forward = np.reshape([*data.transform], (3, 3))
             inverse = np.linalg.inv(forward)
             crs = CRS.from_wkt(data.crs.to_wkt())
+            to_crs = Transformer.from_crs("EPSG:4326", crs, always_xy=True)
     except InputError:
         raise
     except Exception as error:  # rasterio and GDAL raise several kinds
         raise InputError(f"{path}: cannot be read as {what}") from error
-    to_crs = Transformer.from_crs("EPSG:4326", crs, always_xy=True)
 
     def cell(longitude: Real, latitude: Real) -> tuple[Real, Real]:
         column, row = _affine(inverse, *to_crs.transform(longitude, latitude))

@@ -25,8 +25,8 @@ _LIGHT = 299_792_458.0
 _EARTH = 8.5e6
 """The effective radius of the earth, m, in a standard atmosphere (P.526, section 2)."""
 
-_MOST_HEIGHTS = 100_000_000
-"""Heights of the largest file. Chosen: seven tiles by a second of arc."""
+_MOST_HEIGHTS = 25_000_000
+"""Heights of the largest file: two tiles by a second of arc, 200 MB. Chosen."""
 
 _MOST_CELLS = 2000
 """Points a side of the terrain that profiles are taken from. Chosen: 4 million numbers."""
@@ -70,8 +70,9 @@ def diffraction_loss(
     edge = (over - line) * np.sqrt(2 / (wavelength * d * share * (1 - share)))
     up = ((over - first) / (share * d)).max(axis=0)
     down = ((over - last) / ((1 - share) * d)).max(axis=0)
-    seen = up < (last - first) / d
-    at = np.where(seen, 0.5, (last - first + down * d) / np.where(seen, 1.0, (up + down) * d))
+    seen = up <= (last - first) / d
+    both = np.where(seen, 1.0, np.maximum(up + down, np.finfo(float).tiny))
+    at = np.clip((last - first + down * d) / (both * d), share[0], share[-1])
     point = first + up * at * d - (first * (1 - at) + last * at)
     nu = np.where(seen, edge.max(axis=0), point * np.sqrt(2 / (wavelength * d * at * (1 - at))))
     loss = knife_edge_loss(nu)
