@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 import mutate
+import numpy as np
 from conftest import MISSIONS, SMALL
 from flight_logs import kept, ulog
 from harness import Target
@@ -21,6 +22,8 @@ from faao_mav.mission.formats.fence_file import read_fence
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import read_plan
+from faao_mav.radio.gain_map import GainMap
+from faao_mav.radio.map_file import map_archive, read_map
 from faao_mav.study import run_study
 from faao_mav.study.rows import ROWS, comparison, load_rows, table
 from faao_mav.study.sweep import make_cases, parse_vary
@@ -60,6 +63,7 @@ _LINK = (
     b"elevation_deg: [2, 50]\n"
 )
 _RATES = b"# own\nmcs, snr_db, mbit_per_s\n0, 4, 6.5\n1, 7, 13\n2, 9.5, 19.5\n"
+_MAP = b"# own\neast_m, north_m, gain_db\n0, 0, -80\n0, 9, -81.5\n9, 0, nan\n9, 9, -83\n"
 
 _LARGEST_SEED = 5_000
 """Bytes of a mission that is mutated; chosen: small ones are read often."""
@@ -95,6 +99,12 @@ def targets(directory: Path) -> dict[str, Target]:
         plan = directory / f"{key}.yaml"
         plan.write_text(f"{SMALL}  bandwidth_mhz: 20\n  {key}: {name}\n")
         add(key, name, partial(_beside, plan), seed)
+    side = np.arange(3.0)
+    known = GainMap(
+        side, side, side[1:], np.full((2, 3, 3), -90.0), False, np.ones((3, 3)), (47, 8)
+    )
+    add("map", "map.npz", read_map, map_archive(known))
+    add("map_table", "map.csv", read_map, _MAP)
     zones = _DATA / "fences" / "zones"
     for ending in ("kml", "geojson"):
         add(ending, f"fence.{ending}", _fence, zones.with_suffix(f".{ending}").read_bytes())
