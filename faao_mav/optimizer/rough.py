@@ -5,7 +5,6 @@ for each slot.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +27,7 @@ Measured with the user dragged by 70 to 100 m: `copter_relay.yaml` 0.14 % below 
 
 @dataclass(frozen=True)
 class RoughFlight:
-    """A feasible flight of `plan` and the rates of its slots: the fields are those of `Solution`.
+    """A feasible flight of `plan`, rates of its slots, what is relayed: fields of a `Solution`.
 
     >>> from faao_mav import read_plan
     >>> flight = rough_flight(read_plan("missions/copter_relay.yaml"))
@@ -42,12 +41,7 @@ class RoughFlight:
     v: Real
     I_U: Real
     I_G: Real
-
-    @cached_property
-    def relayed(self) -> Relayed:
-        """What the relay receives, forwards and holds, by the plan's duplex and buffer."""
-        queue = build_problem(self.plan).relay
-        return queue.relayed(self.I_U, self.I_G, self.plan.flight.time_step)
+    relayed: Relayed
 
     @property
     def delivered_rate(self) -> float:
@@ -81,4 +75,5 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     ).trajectory
     I_U, I_G = field.value(best.w.T)
     t = np.asarray(kin.time_step * np.arange(kin.slots))
-    return RoughFlight(plan, t, best.w, best.v, I_U, I_G)
+    relayed = problem.relay.relayed(I_U, I_G, kin.time_step)
+    return RoughFlight(plan, t, best.w, best.v, I_U, I_G, relayed)
