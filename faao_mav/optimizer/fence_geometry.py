@@ -1,7 +1,6 @@
 """The fence of a plan as convex pieces: what a path keeps its distance from, and how far it is."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,6 @@ from faao_mav.mission.fence_area import OUTSIDE, free_area
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.plan import Plan
-
-if TYPE_CHECKING:
-    from shapely.geometry.base import BaseGeometry
 
 _SIDES = 64
 """Sides of the polygon inside a circle that stands for an inclusion: 0.12 % of the radius is lost.
@@ -93,7 +89,11 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     zones = plan.zones
     inside = free_area(zones, any_inclusion=plan.any_inclusion)
     inclusions = [
-        zone.shape if zone.disc is None else _disc(*zone.disc) for zone in zones if zone.inclusion
+        zone.shape
+        if zone.disc is None
+        else shapely.Point(zone.disc[:2]).buffer(zone.disc[2], quad_segs=_SIDES // 4)
+        for zone in zones
+        if zone.inclusion
     ]
     if len(inclusions) > 1 and inside is not None and plan.any_inclusion:
         inclusions = [inside.buffer(-_SIMPLER).simplify(_SIMPLER)]
@@ -127,12 +127,6 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     offsets = np.concatenate([offset for _, offset in sides]) if sides else np.empty(0)
     obstacles = ConvexObstacles.of([pieces[k] for k in near], [radii[k] for k in near])
     return FenceGeometry(obstacles, normals, offsets, plan.fence.margin)
-
-
-def _disc(east: float, north: float, radius: float) -> "BaseGeometry":
-    import shapely
-
-    return shapely.Point(east, north).buffer(radius, quad_segs=_SIDES // 4)
 
 
 def _sides(corners: Real) -> tuple[Real, Real]:

@@ -195,13 +195,13 @@ class Search:
         if self.attempts >= _MAX_ATTEMPTS or hugging:
             self._centre()
 
-    def _share(self, direction: Direction) -> float:
-        """Return how far of `direction` to go: inside the limits, as far as they are modelled."""
+    def _share(self, step: Direction) -> float:
+        """Return how far of `step` to go: inside the limits, as far as they are modelled."""
         it = self.iterate
-        bent = np.abs(self.system.bent(it.at, direction.x))
-        missed = float((bent / np.maximum(it.s, _MOST_MISSED)).max())
-        most = 1 / np.sqrt(max(missed, TINY))
-        return float(min(1.0, _TO_BOUNDARY * self._reach(direction), most))
+        falls = max(float((-step.s / it.s).max()), float((-step.z / it.z).max()), TINY)
+        bent = np.abs(self.system.bent(it.at, step.x))
+        missed = max(float((bent / np.maximum(it.s, _MOST_MISSED)).max()), TINY)
+        return float(min(1.0, _TO_BOUNDARY / falls, 1 / np.sqrt(missed)))
 
     def _lower_mu(self, slope: float) -> None:
         """Lower mu where the scaled gradient `slope` tells that the iterate is near its optimum."""
@@ -209,12 +209,6 @@ class Search:
         per_slot = float(self.system.weight.sum()) / self.iterate.at.x.shape[1]
         least = self.tolerance * _LEAST_GAP * self.steepness / per_slot
         self.mu = max(self.mu * (_FALL if solved else 1.0), least)
-
-    def _reach(self, step: Direction) -> float:
-        """Return the share of `step` at which a slack or a multiplier vanishes."""
-        it = self.iterate
-        falls = max(float((-step.s / it.s).max()), float((-step.z / it.z).max()))
-        return 1 / max(falls, TINY)
 
     def _accept(self, step: Direction, share: float) -> bool:
         """Move unless the functions fall short of the model."""

@@ -54,7 +54,10 @@ class SpeedChange(Constraint):
         ends = np.stack([v, v + self.gain * x[2:]])
         speed = np.maximum(np.hypot(*ends.swapaxes(0, 1)), TINY)
         unit = ends / speed[:, None]
-        value = [1 + (speed[1] - speed[0]) / self.fall, 1 - _half_square(speed) / self.rise]
+        value = [
+            1 + (speed[1] - speed[0]) / self.fall,
+            1 - (speed[1] ** 2 - speed[0] ** 2) / (2 * self.rise),
+        ]
         across = (np.eye(2)[:, :, None] - unit[:, :, None] * unit[:, None]) / speed[:, None, None]
         same = np.broadcast_to(np.eye(2)[:, :, None], across.shape)
         both = [
@@ -67,10 +70,6 @@ class SpeedChange(Constraint):
             scale[:, None, None] * np.stack([slope for slope, _ in both]),
             scale[:, None, None, None] * np.stack([bend for _, bend in both]),
         )
-
-
-def _half_square(speed: Real) -> Real:
-    return np.asarray((speed[1] ** 2 - speed[0] ** 2) / 2)
 
 
 def _chained(before: Real, after: Real, gain: float) -> Real:
