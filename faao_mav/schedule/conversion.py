@@ -163,7 +163,7 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
         new = _outside(tried, plan.keep_in), tried.cost  # inside the fence first
         if new < rank:
             chosen, best, rank = k, tried, new
-        if rank <= (0.0, 1.5 * ALLOWED_ERROR):  # others take long and gain little
+        if rank <= (0.0, 1.2 * ALLOWED_ERROR):  # others take long and gain little
             break
     return Conversion(
         mission=assemble(best.route, plan),
