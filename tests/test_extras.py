@@ -74,12 +74,14 @@ def test_a_plan_needs_no_extra(tmp_path: Path) -> None:
         ("app", "app plan.yaml --no-browser"),
         ("app", "app --no-browser"),
         ("debrief", "debrief flight.ulg --plan plan.yaml"),
+        ("maps", "link --terrain dem.tif --frequency 900 --station 1,2,3"),
         ("cluster", "study plan.yaml --cluster tcp://127.0.0.1:9 --out rows"),
     ],
 )
 def test_a_missing_extra_is_named_in_one_line(extra: str, arguments: str, tmp_path: Path) -> None:
     (tmp_path / "plan.yaml").write_text(FLYABLE)
     (tmp_path / "flight.ulg").write_bytes(b"ULog")
+    (tmp_path / "dem.tif").write_bytes(b"II*")
     done = without_extras(tmp_path, *arguments.split())
     said = rf"faao-mission: [^\n]* needs \w+, which is not installed: pip install '\.\[{extra}\]'"
     assert re.fullmatch(rf"{said} in a checkout of faao-mav\n", done.stderr), done.stderr

@@ -79,7 +79,7 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
     content = read_bytes(path, _MAX_BYTES, what)
     if Path(path).suffix.lower() == ".hgt":
         return _tile(content, Path(path))
-    check_extra("maps", "rasterio", f"{path}: {what}")
+    check_extra("maps", "rasterio", f"{path}, a GeoTIFF,")
     import rasterio
     from pyproj import CRS, Transformer
 
