@@ -7,8 +7,7 @@ error. What plans have no use for is refused before it is built: anchors' aliase
 import hashlib
 import io
 import re
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ruamel.yaml import YAML
@@ -16,7 +15,7 @@ from ruamel.yaml.composer import Composer
 from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
-from ruamel.yaml.nodes import MappingNode, Node
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.representer import SafeRepresenter
 from ruamel.yaml.resolver import VersionedResolver
 
@@ -90,7 +89,10 @@ class _PlainComposer(Composer):
         if problem:
             raise _Refused(problem=problem, problem_mark=event.start_mark)
         self.anchors.clear()  # one that is named twice is no matter where none is used
-        return super().compose_node(parent, index)
+        node = super().compose_node(parent, index)
+        if isinstance(node, ScalarNode):
+            node.value = _words_of(self.loader.long, node.value)
+        return node
 
 
 class _UniqueKeys(SafeConstructor):
@@ -118,14 +120,17 @@ class _Blocks(SafeRepresenter):
 
     def represent_str(self, data: str) -> Any:
         style = "|" if _LINES.fullmatch(data) else None
-        return self.represent_scalar("tag:yaml.org,2002:str", data, style=style)
+        short = _without_words(self.dumper.long, data)
+        return self.represent_scalar("tag:yaml.org,2002:str", short, style=style)
 
 
 _Blocks.add_representer(str, _Blocks.represent_str)
 
 
 def _yaml() -> Any:
+    """Return what reads and writes; its `long` are the words for which others stand."""
     yaml: Any = YAML(typ="safe", pure=True)
+    yaml.long = {}
     yaml.Representer = _Blocks
     yaml.Resolver, yaml.Composer, yaml.Constructor = _CoreResolver, _PlainComposer, _UniqueKeys
     return yaml
@@ -141,14 +146,13 @@ def dump_yaml(data: Mapping[str, Any]) -> str:
       - 0
       - 1.5
     """
-    long: dict[str, str] = {}
     yaml = _yaml()
     yaml.default_flow_style = yaml.allow_unicode = False
     yaml.sort_base_mapping_type_on_output = False
     yaml.width = _MAX_WIDTH
     text = io.StringIO()
-    yaml.dump(_with_words(data, partial(_without_words, long)), text)
-    return _words_of(long, text.getvalue())
+    yaml.dump(data, text)
+    return _words_of(yaml.long, text.getvalue())
 
 
 def shown(text: str) -> str:
@@ -172,18 +176,6 @@ def _words_of(long: dict[str, str], text: str) -> str:
     return _STAND_IN.sub(lambda found: long.get(found[0], found[0]), text) if long else text
 
 
-def _with_words(value: Any, change: Callable[[str], str]) -> Any:
-    """Return the data `value` with its words changed."""
-    match value:
-        case dict():
-            return {key: _with_words(inside, change) for key, inside in value.items()}
-        case list():
-            return [_with_words(inside, change) for inside in value]
-        case str():
-            return change(value)
-    return value
-
-
 def load_yaml(text: str, source: str) -> dict[str, Any]:
     """Return the mapping that `text` holds.
 
@@ -195,14 +187,14 @@ def load_yaml(text: str, source: str) -> dict[str, Any]:
     """
     if text.startswith("QGC WPL") or (text.lstrip()[:1] == "{" and '"fileType"' in text):
         raise PlanError(f"{source}: a mission, not a plan; faao-mission validate takes missions")
-    long: dict[str, str] = {}
-    text = _without_words(long, text)
+    yaml = _yaml()
+    text = _without_words(yaml.long, text)
     if len(text) > MAX_CHARACTERS:
         raise PlanError(
             f"{source}: {len(text):,} characters; a plan has at most {MAX_CHARACTERS:,}"
         )
     try:
-        data = _yaml().load(text)
+        data = yaml.load(text)
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
@@ -220,4 +212,4 @@ def load_yaml(text: str, source: str) -> dict[str, Any]:
         raise PlanError(
             f"{source}: a plan is a mapping of sections (site, flight, ...), not {found}"
         )
-    return {key: _with_words(inside, partial(_words_of, long)) for key, inside in data.items()}
+    return data

@@ -10,7 +10,7 @@ from targets import targets
 from wire_targets import wire_targets
 
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
-         "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
+         "map", "map_table", "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
 TAPES = {"client": 50, "mock_ardupilot": 20, "mock_px4": 15,
          "signed": 150}  # fmt: skip
 CASES = dict.fromkeys(FILES, 300) | TAPES
