@@ -15,6 +15,7 @@ from faao_mav.errors import quote
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, Polygon
 from faao_mav.mission.shortest_way import shortest_way
+from faao_mav.vector import Vector
 
 _SEGMENTS = 64
 """Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
@@ -170,6 +171,12 @@ class FreeArea:
         """Return the places at least `margin` metres from the edge, but for 0.1 mm a metre."""
         return FreeArea(_polygonal(self.shape.buffer(-margin * OUTSIDE, quad_segs=_SEGMENTS)))
 
+    def within(self, low: Vector, high: Vector) -> "FreeArea":
+        """Return what lies in the rectangle from the corner `low` to `high`, m."""
+        if low[0] >= high[0] or low[1] >= high[1]:
+            return FreeArea(shapely.Polygon())
+        return FreeArea(_polygonal(self.shape & shapely.box(low[0], low[1], high[0], high[1])))
+
     def edges(self) -> list[Real]:
         """Return the closed rings (k, 2), m, that bound the area; of the plane's square none."""
         return [ring for ring in _rings(self.shape) if np.abs(ring).max() < FARTHEST / 2]
@@ -177,6 +184,11 @@ class FreeArea:
     def covers(self, points: Real) -> Flags:
         """Return which of `points` (n, 2) lie inside or on the edge, (n,)."""
         return np.asarray(shapely.covers(self._prepared, shapely.points(points)), dtype=np.bool_)
+
+    def connected(self, points: Real) -> bool:
+        """Return whether all `points` (n, 2) are in one part of the area."""
+        parts = shapely.get_parts(self.shape)[:, None]
+        return bool(shapely.covers(parts, shapely.points(points)).all(axis=1).any())
 
     def clearance(self, path: Real) -> float:
         """Return the least distance of the polyline `path` (n, 2) from the edge, m.

@@ -150,15 +150,15 @@ def _routes(
 ) -> dict[str, Trajectory]:
     """Return the flights from which the search starts, by name.
 
-    They are those of `optimizer.starts`, over maps the straight one and `map`; `cutoff`, that of
-    the plan for the cutoff rate `before`; and `known`, that of a similar plan, or this `alone`.
+    They are those of `optimizer.starts`, over maps those of `map`; `cutoff`, that of the plan
+    for the cutoff rate `before`; and `known`, that of a similar plan, or this `alone`.
     """
     kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
     stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
     names = ("straight",) if alone or problem.mapped else problem.plan.optimizer.starts
-    routes = starts(kin, names, stations, problem.free_area, fenced)
-    if problem.mapped and not alone:
-        routes |= starts_over_map(problem, field)
+    routes = starts_over_map(problem, field) if problem.mapped and not alone else {}
+    if not routes:
+        routes = starts(kin, names, stations, problem.free_area, fenced)
     if before is not None:
         routes["cutoff"] = before.trajectory
     if known is not None:

@@ -1,6 +1,6 @@
 """The fence of a plan as convex pieces: what a path keeps its distance from, and how far it is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +40,15 @@ class FenceGeometry:
             bulges[0] = max(bulge, kin.max_speed * kin.time_step / 4)
         return self.margin + bulges
 
+    def near(self, path: Real, distance: float) -> "FenceGeometry":
+        """Return it with the obstacles within a `distance`, m, of a `path` (n, 2) alone."""
+        import shapely
+
+        shapes = [shapely.MultiPoint(each).convex_hull for each in self.obstacles.corners]
+        away = shapely.distance(shapes, shapely.LineString(path)) - self.obstacles.radius
+        kept = away <= distance + self.margin
+        return replace(self, obstacles=self.obstacles.only(kept))
+
     def clearance(self, flight: Trajectory, time_step: float) -> float:
         """Return a lower bound of the distance of the continuous path of `flight`, m.
 
@@ -76,17 +85,18 @@ def _least_along(u: Real, w: Real, v: Real, a: Real, dt: float) -> Real:
 
 
 def fence_geometry(plan: Plan) -> FenceGeometry | None:
-    """Return what the path of `plan` keeps `fence.margin` from; None without a fence.
+    """Return what the path of `plan` keeps its margin from; None where it may be anywhere.
 
-    Exclusions are cut into convex pieces; circles are discs, as large as the polygons that other
-    checks have for them. Areas to stay in are their convex hulls, and what the hulls have beyond
-    the areas is more pieces. Pieces that the flight cannot reach in the time it has are left out.
+    Exclusions, and ground under maps, are cut into convex pieces; circles are discs, as large as
+    the polygons that other checks have for them. Areas to stay in are their convex hulls, and what
+    the hulls have beyond the areas is more pieces. Pieces that the flight cannot reach in the time
+    it has are left out.
     """
     import shapely
 
-    if plan.fence is None or not plan.geofence:
+    if plan.keep_in is None:
         return None
-    zones = plan.zones
+    zones = (*plan.zones, *plan.ground)
     inside = free_area(zones, any_inclusion=plan.any_inclusion)
     inclusions = [
         zone.shape
@@ -117,7 +127,10 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
             pieces += parts
             radii += [0.0] * len(parts)
     ends = shapely.points([plan.flight.start, plan.flight.end])
-    most = plan.max_ground_speed * plan.flight.duration + 2 * plan.fence.margin
+    if plan.mapped is not None:
+        (west, south), (east, north) = plan.mapped
+        sides.append(_sides(shapely.get_coordinates(shapely.box(west, south, east, north))))
+    most = plan.max_ground_speed * plan.flight.duration + 2 * plan.margin
     near = [
         k
         for k, (piece, radius) in enumerate(zip(pieces, radii, strict=True))
@@ -126,7 +139,7 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     normals = np.concatenate([normal for normal, _ in sides]) if sides else np.empty((0, 2))
     offsets = np.concatenate([offset for _, offset in sides]) if sides else np.empty(0)
     obstacles = ConvexObstacles.of([pieces[k] for k in near], [radii[k] for k in near])
-    return FenceGeometry(obstacles, normals, offsets, plan.fence.margin)
+    return FenceGeometry(obstacles, normals, offsets, plan.margin)
 
 
 def _sides(corners: Real) -> tuple[Real, Real]:

@@ -204,13 +204,13 @@ class Problem:
 
     @cached_property
     def free_area(self) -> FreeArea | None:
-        """Where the fence and its margin let the path be, local metres; None without a fence."""
-        fence, area = self.plan.fence, self.plan.keep_in
-        return None if fence is None or area is None else area.inside(fence.margin)
+        """Where fence, ground, maps and margin let the path be, local metres; None: anywhere."""
+        area = self.plan.keep_in
+        return None if area is None else area.inside(self.plan.margin)
 
     @cached_property
     def fence(self) -> FenceGeometry | None:
-        """What the path keeps its distance from; None without a fence."""
+        """What the path keeps its distance from; None where it may be anywhere."""
         return fence_geometry(self.plan)
 
     def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
@@ -218,13 +218,18 @@ class Problem:
         energy = self.energy_limit(kin)
         return (*self.fenced(kin), *([] if energy is None else [energy]))
 
-    def fenced(self, kin: Kinematics) -> "tuple[Constraint, ...]":
-        """Return what flights of `kin` have to keep of the fence."""
+    def fenced(
+        self, kin: Kinematics, near: tuple[Real, float] | None = None
+    ) -> "tuple[Constraint, ...]":
+        """Return what flights of `kin` have to keep of the fence.
+
+        With `near` that is what matters to flights within so many m of a path (n, 2).
+        """
         if self.fence is None:
             return ()
         from faao_mav.optimizer.interior.fence import fence_constraints  # brings scipy along
 
-        return fence_constraints(self.fence, kin)
+        return fence_constraints(self.fence if near is None else self.fence.near(*near), kin)
 
     def energy_of(self, flight: Trajectory) -> float | None:
         """Return what `flight` and relay take, J, as sums over the slots; None without a model."""

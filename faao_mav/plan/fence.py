@@ -99,36 +99,40 @@ def _degrees(frame: LocalFrame, places: Sequence[Vector]) -> tuple[LatLon, ...]:
 
 
 def fence_problems(plan: PlanContents) -> Iterator[str]:
-    """Yield why no flight of `plan` can keep `fence.margin` from the edge of the fence."""
+    """Yield why no flight of `plan` can keep its margin from the edge of fence, ground and maps."""
     area = plan.keep_in
-    if plan.fence is None or area is None:
+    if area is None:
         return
     for part in plan.zones:
         if part.crosses_itself:
             yield f"fence: {part.name} crosses or touches itself; put its corners in order"
-    margin = plan.fence.margin
+    margin, what = plan.margin, margin_key(plan)
     if area.empty:
         yield "fence: leaves no place; the inclusions do not overlap, or exclusions cover them"
     kept = area.inside(margin)
     if kept.empty:
-        yield f"fence.margin: {margin:g} m: no place is that far from the edge; give less"
-    if plan.optimizer.method == "algorithm1":
+        yield f"{what}: {margin:g} m: no place is that far from the edge; give less"
+    if plan.geofence and plan.optimizer.method == "algorithm1":
         yield "fence: algorithm1 (optimizer.method) plans without one; give method direct"
     ends = {"start": plan.flight.start, "end": plan.flight.end}
     for name, place in ends.items():
-        if not kept.covers(np.array([place])).all():
+        if not kept.covers(np.array([place])).all() and all(
+            known.above_law or known.covers(place) for known in plan.maps
+        ):
             yield f"flight.{name}: {list(place)} is {trouble(plan, place)}"
     yield from _way_problems(plan, kept)
 
 
 def _way_problems(plan: PlanContents, kept: FreeArea) -> Iterator[str]:
     """Yield why the way from start to end cannot be flown."""
-    flight, margin = plan.flight, plan.fence.margin if plan.fence else 0.0
-    way = kept.shortest_way(np.array(flight.start), np.array(flight.end))
-    if way is None:
+    flight, margin = plan.flight, plan.margin
+    ends = np.array([flight.start, flight.end])
+    # among the many corners of ground the shortest way takes long
+    way = ends if plan.ground else kept.shortest_way(*ends)
+    if way is None or not kept.connected(ends):
         yield (
-            f"fence: no way leads from flight.start {list(flight.start)} to flight.end "
-            f"{list(flight.end)} that keeps {margin:g} m (fence.margin) from the edge"
+            f"{edge_of(plan)}: no way leads from flight.start {list(flight.start)} to flight.end "
+            f"{list(flight.end)} that keeps {margin:g} m ({margin_key(plan)}) from the edge"
         )
         return
     length = float(np.hypot(*np.diff(way, axis=0).T).sum())
@@ -136,32 +140,43 @@ def _way_problems(plan: PlanContents, kept: FreeArea) -> Iterator[str]:
     if length > most * (1 + _SHORTER_WAY):
         yield (
             f"flight.duration: {flight.duration:g} s is too short: the shortest way from start to "
-            f"end inside the fence is {length:.0f} m, and {plan.max_ground_speed:g} m/s takes the "
-            f"aircraft {most:.0f} m"
+            f"end inside the {edge_of(plan)} is {length:.0f} m, and {plan.max_ground_speed:g} m/s "
+            f"takes the aircraft {most:.0f} m"
         )
 
 
 def trouble(plan: PlanContents, place: Vector) -> str:
-    """Return where a `place`, m, is that lies outside the fence of `plan` or near its edge."""
+    """Return where a `place`, m, is that `keep_in` of `plan` leaves out, or near its edge."""
     import shapely
 
     area = plan.keep_in
     assert area is not None
-    point, margin = shapely.Point(place), plan.fence.margin if plan.fence else 0.0
+    point, margin = shapely.Point(place), plan.margin
     clearance = area.clearance(np.array([place]))
-    for part in plan.zones:
+    for part in (*plan.zones, *plan.ground):
         if not part.inclusion and part.shape.distance(point) < margin:
             depth = part.shape.boundary.distance(point)
+            whose = "under the map" if part in plan.ground else "of the fence"
             if part.shape.contains(point):
-                return f"{depth:.1f} m inside {part.name} of the fence; move it out"
-            return _near(depth, part.name, margin)
+                return f"{depth:.1f} m inside {part.name} {whose}; move it out"
+            return _near(plan, depth, part.name)
     if clearance < 0:
         return f"{-clearance:.1f} m outside the inclusions of the fence; move it inside"
-    return _near(clearance, "the edge of the fence", margin)
+    return _near(plan, clearance, f"the edge of the {edge_of(plan)}")
 
 
-def _near(distance: float, what: str, margin: float) -> str:
+def _near(plan: PlanContents, distance: float, what: str) -> str:
     return (
-        f"{distance:.1f} m from {what}, less than fence.margin ({margin:g} m); "
+        f"{distance:.1f} m from {what}, less than {margin_key(plan)} ({plan.margin:g} m); "
         "move it, or give a smaller margin"
     )
+
+
+def margin_key(plan: PlanContents) -> str:
+    """Return the key that the margin of `plan` is of."""
+    return "mission.path_tolerance" if plan.fence is None else "fence.margin"
+
+
+def edge_of(plan: PlanContents) -> str:
+    """Return what the path of `plan` keeps inside of, in a word."""
+    return "map" if plan.fence is None else "fence"

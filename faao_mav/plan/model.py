@@ -19,6 +19,7 @@ from faao_mav.plan.fields import (
     key,
     section,
 )
+from faao_mav.plan.ground import ground_areas
 from faao_mav.plan.radio import Radio
 from faao_mav.plan.sections import (
     Flight,
@@ -32,6 +33,7 @@ from faao_mav.plan.sections import (
 )
 from faao_mav.plan.zones import FenceOptions
 from faao_mav.power import PowerModel
+from faao_mav.radio.gain_map import GainMap
 from faao_mav.vector import Vector
 
 
@@ -136,14 +138,33 @@ class PlanContents(PlanFile):
         return self._known.fence_needs_one_inclusion(self._bare)
 
     @property
-    def keep_in(self) -> FreeArea | None:
-        """Where `geofence` lets the aircraft be, local metres; None without a fence.
+    def maps(self) -> tuple[GainMap, ...]:
+        """The maps of the gains, each once."""
+        return tuple(dict.fromkeys(law.map for law in self.radio.gain_laws if law.map is not None))
 
-        `fence.margin` is not taken off.
+    @property
+    def ground(self) -> tuple[Area, ...]:
+        """Where ground under the maps is higher than the flight, as areas to stay out of."""
+        flight = self.flight
+        return ground_areas(self.maps, flight.altitude, (flight.start, flight.end, (0.0, 0.0)))
+
+    @property
+    def keep_in(self) -> FreeArea | None:
+        """Where fence, ground and maps let the aircraft be, local metres; None without any of them.
+
+        The `margin` is not taken off.
         """
-        if not self.geofence:
+        if not self.geofence and not self.ground and self.mapped is None:
             return None
-        return _free_area(self.zones, self.any_inclusion)
+        return _free_area((*self.zones, *self.ground), self.any_inclusion, self.mapped)
+
+    @property
+    def margin(self) -> float:
+        """How far the path keeps from the edge of where it may be, m.
+
+        Without a fence it is as far as it may stray.
+        """
+        return self.mission.path_tolerance if self.fence is None else self.fence.margin
 
     @property
     def mapped(self) -> tuple[Vector, Vector] | None:
@@ -183,5 +204,8 @@ def _zones(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
 
 
 @lru_cache(maxsize=16)
-def _free_area(zones: tuple[Area, ...], any_inclusion: bool) -> FreeArea:
-    return FreeArea.of(zones, any_inclusion=any_inclusion)
+def _free_area(
+    zones: tuple[Area, ...], any_inclusion: bool, mapped: tuple[Vector, Vector] | None
+) -> FreeArea:
+    free = FreeArea.of(zones, any_inclusion=any_inclusion)
+    return free if mapped is None else free.within(*mapped)

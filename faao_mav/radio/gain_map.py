@@ -18,6 +18,9 @@ from faao_mav.radio.spline import Spline
 _B_SPLINE = np.array([1, 4, 1]) / 6
 """The cubic B-spline at its own point of the grid and at those beside it."""
 
+_BEYOND = 3
+"""Points of such a spline beyond the grid: at two it is level."""
+
 _FARTHEST = 10_000.0
 """Metres between a map's own origin and the plan's at most: the meridians of both are parallel
 within 3e-3 up to 60 degrees of latitude, 3 m at a kilometre from the middle of the map."""
@@ -144,13 +147,17 @@ class Grid:
         return np.asarray(most)
 
     def smoothed(self) -> Spline:
-        """Return the bicubic B-spline whose coefficients are the values: within their extremes."""
+        """Return the bicubic B-spline whose coefficients are the values: within their extremes.
+
+        It goes on beyond the grid until it is level there.
+        """
         from scipy.ndimage import correlate1d  # with the optimiser, not before
 
-        smooth = self.values
+        smooth = np.pad(self.values, _BEYOND, mode="edge")
         for axis in (0, 1):
             smooth = correlate1d(smooth, _B_SPLINE, axis, mode="nearest")
-        return Spline.through(self.x, self.y, smooth)
+        x, y = (_widened(side, _BEYOND) for side in (self.x, self.y))
+        return Spline.through(x, y, smooth)
 
 
 def _located(grid: Real, x: Real) -> tuple[Integers, Real]:
@@ -160,10 +167,10 @@ def _located(grid: Real, x: Real) -> tuple[Integers, Real]:
     return cell, at - cell
 
 
-def _widened(side: Real) -> Real:
-    """Return an even grid with one point more at both ends."""
-    step = side[1] - side[0]
-    return np.concatenate([[side[0] - step], side, [side[-1] + step]])
+def _widened(side: Real, points: int = 1) -> Real:
+    """Return an even grid with so many `points` more at both ends."""
+    away = (side[1] - side[0]) * np.arange(1, points + 1)
+    return np.concatenate([side[0] - away[::-1], side, side[-1] + away])
 
 
 def filled(db: Real) -> Real:

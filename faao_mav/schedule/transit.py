@@ -9,6 +9,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError, InputError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.plan import Plan
+from faao_mav.plan.fence import edge_of, margin_key, trouble
 from faao_mav.schedule.route import Route
 
 ROUNDING = 0.012
@@ -23,7 +24,7 @@ around a circle of 60 m they are 30 m apart."""
 def check_transit(plan: Plan) -> None:
     """Raise where no flight of `plan` gets from home to flight.start, and back if it has to.
 
-    `InputError` for a home that is nearer to the edge of the fence than `fence.margin`,
+    `InputError` for a home that is nearer to the edge than the plan's margin,
     `InfeasibleError` where there is no way.
     """
     way_out(plan, np.array(plan.flight.start))
@@ -51,7 +52,7 @@ def way_between(plan: Plan, start: Real, end: Real) -> Real | None:
     It keeps the plan's margin from the edge of the fence, where `start` is nearer to it from the
     nearest place on that does. None where there is no such way inside the fence.
     """
-    fence, margin = plan.keep_in, _margin(plan)
+    fence, margin = plan.keep_in, plan.margin
     if fence is None:
         return np.array([start, end])
     kept = _kept(fence, margin)
@@ -74,26 +75,24 @@ def check_run_in(plan: Plan, route: Route) -> None:
     fence, last = plan.keep_in, len(route.positions) - 1
     if fence is None:
         return
-    area = _kept(fence, _margin(plan))
+    area = _kept(fence, plan.margin)
     legs = ((0, route.first, "start"), (route.last, last, "end"))
     for begin, end, name in legs:
         leg = route.positions[begin : end + 1]
         if len(leg) > 1 and not area.covers_path(leg):
             raise InfeasibleError(
-                f"fence: the aircraft takes {route.leg_lengths[begin]:.0f} m to get up to speed "
-                f"before flight.start, or to slow down after flight.end, and at flight.{name} that "
-                f"leg comes nearer to the edge than {_margin(plan):g} m (fence.margin): give "
-                f"flight.{name}_velocity: hover, or move flight.{name}"
+                f"{edge_of(plan)}: the aircraft takes {route.leg_lengths[begin]:.0f} m to get up "
+                f"to speed before flight.start, or to slow down after flight.end, and at "
+                f"flight.{name} that leg comes nearer to the edge than {plan.margin:g} m "
+                f"({margin_key(plan)}): give flight.{name}_velocity: hover, or move flight.{name}"
             )
 
 
 def _corners(plan: Plan, start: Real, end: Real, name: str) -> Real:
-    fence, margin = plan.keep_in, _margin(plan)
+    fence, margin = plan.keep_in, plan.margin
     if fence is None:
         return np.empty((0, 2))
     if not _kept(fence, margin).covers(np.zeros((1, 2))).all():
-        from faao_mav.plan.fence import trouble
-
         raise InputError(
             f"{plan.source}: site.origin: home, where the mission takes off, is "
             f"{trouble(plan, (0.0, 0.0))}"
@@ -101,8 +100,9 @@ def _corners(plan: Plan, start: Real, end: Real, name: str) -> Real:
     way = _way(fence, margin, start, end)
     if way is None:
         raise InfeasibleError(
-            f"fence: no way leads from {name} that keeps {margin:g} m (fence.margin) from "
-            "the edge; give a smaller margin, move home, or change the fence"
+            f"{edge_of(plan)}: no way leads from {name} that keeps {margin:g} m "
+            f"({margin_key(plan)}) from the edge; give a smaller margin, move home, or change the "
+            f"{edge_of(plan)}"
         )
     return way[1:-1]
 
@@ -139,7 +139,3 @@ def _straightened(area: FreeArea, way: Real) -> Real:
 def _kept(fence: FreeArea, margin: float) -> FreeArea:
     """Return where a `fence` and a `margin`, m, let the aircraft be."""
     return fence.inside(max(margin - ROUNDING, 0.0))
-
-
-def _margin(plan: Plan) -> float:
-    return plan.fence.margin if plan.fence is not None else 0.0

@@ -14,6 +14,8 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
+from faao_mav.plan.ground import in_ground
 from faao_mav.schedule.initial_route import begins_at_speed
 from faao_mav.schedule.prediction import Prediction, rates_along
 from faao_mav.schedule.schedule import passing
@@ -33,6 +35,10 @@ _EVERY = 10
 
 _LEAST = 1e-6
 """The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
+
+_LOWER = 2.0
+"""Metres below flight.altitude from which a predicted flight has to be clear of the ground that is
+higher than that. Chosen: lower down it takes off or lands."""
 
 _ANGLE, _FACTOR, _SHARE = 1.0, 1.05, 0.1
 """Degrees and factor of distance by which a slot may be beyond what was measured, and the share of
@@ -63,11 +69,29 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         altitude_error=line.altitude_error(solution),
         worst=_worst(solution, flown),
         unmeasured=tuple(_unmeasured(solution)),
+        off_map=_off_map(plan, line),
         away=float(distances_to_path(line.w[::_EVERY], solution.w).min()),
         begins=float(track.t[0] - line.t[0]),
         late_share=_late_share(solution, flown),
     )
     return link, flown
+
+
+def _off_map(plan: Plan, line: Line) -> str:
+    """Return where the predicted flight first is in ground or off a map of the gain; "" nowhere."""
+    aloft = line.up > plan.flight.altitude - _LOWER
+    t, w = line.t[aloft], line.w[aloft]
+    low, high = plan.mapped or ((-np.inf, -np.inf), (np.inf, np.inf))
+    off = ((w < low) | (w > high)).any(axis=1)
+    for gone, where in (
+        (in_ground(plan.maps, plan.flight.altitude, w), "in the ground under"),
+        (off, "off"),
+    ):
+        if gone.any():
+            k = int(gone.argmax())
+            east, north = w[k].round(1).tolist()
+            return f"{where} the map of the gain at [{east:g}, {north:g}] m, after {t[k]:.0f} s"
+    return ""
 
 
 def _late_share(solution: Solution, flown: Prediction) -> float | None:

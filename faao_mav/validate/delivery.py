@@ -41,6 +41,8 @@ def _link(context: ValidationContext) -> Hits:
         yield hit("radio-values", told=told, instead=instead)
     for told in link.unmeasured:
         yield hit("link-unmeasured", told=told)
+    if link.off_map:
+        yield hit("link-off-map")
     if link.elsewhere:  # and nothing is said of the flight
         yield hit("link-elsewhere", away=link.away / 1000)
         return

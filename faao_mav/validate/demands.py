@@ -66,7 +66,8 @@ class LinkCheck:
     `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
     None if none does; `bandwidth_mhz` is None where the plan has none. `radio` is what the plan
     says of both links, `away` the least distance, m, between the two paths. `unmeasured` says
-    where the planned route leaves what the gain of a hop was measured at. The plan begins `begins`
+    where the planned route leaves what the gain of a hop was measured at, `off_map` where the
+    predicted flight first is in ground or off a map of the gain. The plan begins `begins`
     s after the mission; `late_share` is the part of the planned rate that one which begins
     `LATE_START` later delivers, None where no station moves.
 
@@ -93,6 +94,7 @@ class LinkCheck:
     radio: Radio | None = None
     away: float = 0.0
     unmeasured: tuple[str, ...] = ()
+    off_map: str = ""
     begins: float = 0.0
     late_share: float | None = None
 

@@ -30,7 +30,8 @@ def test_the_rule_speaks_and_is_silent(name: str) -> None:
 
 
 def test_every_rule_is_tried_and_can_be_cited() -> None:
-    assert {row[0] for row in ROWS} | {"radio-values", "link-unmeasured"} == {r.id for r in RULES}
+    others = {"radio-values", "link-unmeasured", "link-off-map"}
+    assert {row[0] for row in ROWS} | others == {rule.id for rule in RULES}
     assert len({rule.id for rule in RULES}) == len(RULES)
     for rule in RULES:
         assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", rule.id)
@@ -105,6 +106,10 @@ def test_what_findings_say() -> None:
     link = replace(LINK, predicted_delivered=0.5, worst=Stretch(30, 41, 0.05))
     (found,) = Given(FLOWN, COPTER, link=link).by("link-rate-reduced")
     assert "25.0 %; 0.05 of it between 30 and 41 s" in found.message
+    link = replace(LINK, off_map="off the map of the gain at [30, 40] m, after 12 s")
+    (found,) = Given(FLOWN, COPTER, link=link).by("link-off-map")
+    assert "predicted to be off the map of the gain at [30, 40] m, after 12 s" in found.message
+    assert not [*Given(FLOWN, COPTER, link=LINK).by("link-off-map")]
     far = replace(LINK, path_error=7e6, away=7e6, rms_position_error=7e6, predicted_delivered=0.0)
     assert [each.rule for each in validate(Given(FLOWN, COPTER, link=far))] == ["link-elsewhere"]
     (found,) = given("home=47.4,8.5,400 waypoint@8.5012,47.4003,30").by("too-far")

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 
 _SHORTEST = 1e-12
 """The least length that a direction is divided by; far below a rounding error of positions."""
@@ -38,6 +38,10 @@ class ConvexObstacles:
         most = max(map(len, pieces), default=1)
         padded = [np.vstack([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in pieces]
         return cls(np.array(padded).reshape(-1, most, 2), np.array(radii, dtype=np.float64))
+
+    def only(self, kept: Flags) -> "ConvexObstacles":
+        """Return those obstacles that are `kept` (P,)."""
+        return ConvexObstacles(self.corners[kept], self.radius[kept])
 
     def __len__(self) -> int:
         return len(self.corners)

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.constraint import Constraint, Rows, W
-from faao_mav.optimizer.interior.maximize import LocalOptimum, maximize, objective
+from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, Rows, W, every_excess
+from faao_mav.optimizer.interior.maximize import LocalOptimum, constraints_of, maximize, objective
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
@@ -38,7 +39,17 @@ _NARROWING = ((1.0, 0.5), (1.0, 0.25), (0.5, 0.125))
 Measured on six sites with ridges: from 2 % below the path's own rate to 1 % above. Spreads in the
 map itself, over its cells, end up to 20 % lower: they take from the lit side of an edge alone."""
 
-ITERATIONS = 30
+_ROOMS = (2.0, 1.0, 0.5, 0.0)
+"""Sides of a cell that a path keeps from obstacles: the first of which there is a flight. Chosen:
+a flight cuts corners of its path by a cell or so, and may not find out of an obstacle again."""
+
+_NEAR = 3.0
+"""Sides of a cell from a path within which obstacles count for the flight nearest to it. Chosen."""
+
+ROUGHLY = _NARROWING[1:2]
+"""The search of them that a rough flight has."""
+
+_ITERATIONS = 30
 """Steps of each of these searches at most. Chosen."""
 
 _TOLERANCE = 1e-4
@@ -65,21 +76,53 @@ def starts_over_map(
     problem: Problem, field: RateField, cells: Sequence[int] = CELLS
 ) -> dict[str, Trajectory]:
     """Return the flights nearest to the best paths over so many `cells`: `map`, `map 2` and on."""
-    kin, found = problem.kinematics, dict[str, Trajectory]()
-    t = kin.time_step * np.arange(kin.slots)
-    for number, count in enumerate(cells, 1):
-        sweep = queue_sweep(problem, field, count)
-        at = np.concatenate([[0.0], sweep.cells.instants, t[-1:]])
-        places = np.vstack([kin.start, sweep.path(), kin.end])
-        path = np.stack([np.interp(t, at, each) for each in places.T], axis=1)
-        flight = nearest_flight(kin, path, straight_flight(kin), problem.fenced(kin))
+    found: dict[str, Trajectory] = {}
+    for count in cells:
+        rooms = (0.0,) if problem.free_area is None else _ROOMS
+        flights = (_flown(problem, queue_sweep(problem, field, count, room)) for room in rooms)
+        flight = next(filter(None, flights), None)
         if flight is not None:
-            found["map" if number == 1 else f"map {number}"] = flight
+            found[f"map {len(found) + 1}" if found else "map"] = flight
     return found
 
 
-def queue_sweep(problem: Problem, field: RateField, cells: int) -> QueueSweep:
+def _flown(problem: Problem, sweep: QueueSweep) -> Trajectory | None:
+    """Return the flight nearest to the best path of a `sweep`; None where none keeps the fence."""
+    kin = problem.kinematics
+    t = kin.time_step * np.arange(kin.slots)
+    at = np.concatenate([[0.0], sweep.cells.instants, t[-1:]])
+    places = np.vstack([kin.start, sweep.path(), kin.end])
+    at, places = _around(problem.free_area, at, places)
+    path = np.stack([np.interp(t, at, each) for each in places.T], axis=1)
+    about = problem.fenced(kin, (path, _NEAR * sweep.cells.side))
+    flight = nearest_flight(kin, path, straight_flight(kin), about)
+    limits = (*constraints_of(kin), *problem.fenced(kin))
+    kept = flight is not None and every_excess(kin, limits, flight) <= ALLOWED
+    return flight if kept else None
+
+
+def _around(area: FreeArea | None, t: Real, places: Real) -> tuple[Real, Real]:
+    """Return `places` (k, 2) at times `t` (k,) with the corners of ways within an `area` between.
+
+    A step of the path is straight, and may cut the corner of an obstacle.
+    """
+    times, ways = [t[:1]], [places[:1]]
+    for k in range(len(t) - 1):
+        way = places[k : k + 2]
+        if area is not None and not area.covers_path(way):
+            around = area.shortest_way(*way)
+            way = way if around is None else around
+        gone = np.cumsum(np.hypot(*np.diff(way, axis=0).T))
+        share = gone / gone[-1] if gone[-1] else np.ones(1)
+        times.append(t[k] + (t[k + 1] - t[k]) * share)
+        ways.append(way[1:])
+    return np.concatenate(times), np.concatenate(ways)
+
+
+def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.0) -> QueueSweep:
     """Return the sweep of `problem` over about so many `cells`, by the rates of `field`.
+
+    It keeps `room` sides of a cell from obstacles, but for the ends.
 
     Draws that are known for each slot do not count in it, nor does what follows a station: rates
     are those where it is at an instant.
@@ -94,8 +137,11 @@ def queue_sweep(problem: Problem, field: RateField, cells: int) -> QueueSweep:
     reach = float(np.clip(way / (100 * _side(problem, cells)), _REACH, 2 * _REACH))
     found = cells_of(kin, places, cells, reach, problem.free_area)
     if problem.free_area is not None:
-        inside = problem.free_area.covers(found.x.reshape(2, -1).T).reshape(found.free.shape)
-        found = replace(found, alive=found.alive & inside)
+        x, ends = found.x.reshape(2, -1), np.stack([kin.start, kin.end])
+        inside = problem.free_area.inside(room * found.side).covers(x.T)
+        near = np.hypot(*(x - ends[:, :, None]).swapaxes(0, 1)).min(axis=0) < 2 * found.side
+        inside |= near & problem.free_area.covers(x.T)
+        found = replace(found, alive=found.alive & inside.reshape(found.free.shape))
     if any(link.gains.station.ndim > 1 for link in problem.links):
         slots = [int(block[len(block) // 2]) for block in found.blocks]
         fields = [field.in_slot(slot) for slot in slots]
@@ -115,23 +161,31 @@ def queue_sweep(problem: Problem, field: RateField, cells: int) -> QueueSweep:
 
 
 def improved_over_map(
-    problem: Problem, field: RateField, start: Trajectory, iterations: int = ITERATIONS
+    problem: Problem,
+    field: RateField,
+    start: Trajectory,
+    iterations: int = _ITERATIONS,
+    searches: Sequence[tuple[float, float]] = _NARROWING,
 ) -> LocalOptimum:
     """Return the best of `start` and of what searches in tubes about it end in, by `field`."""
     kin, relay = problem.kinematics, problem.maximised_queue
-    smooth, kept = field.smoothed(), problem.constraints(kin)
-    side = _side(problem, CELLS[0])
+    smooth, side = field.smoothed(), _side(problem, CELLS[0])
+    energy = problem.energy_limit(kin)
 
     def value(flight: Trajectory) -> float:
         return objective(field.value(flight.w.T), kin, relay)
 
     now, best = start, LocalOptimum(start, value(start), 0, np.inf, False)
-    for radius, spread in _NARROWING:
+    for radius, spread in searches:
         found = maximize(
             kin,
             Blurred(smooth, spread * side),
             now,
-            constraints=(*kept, Tube(now.w.T / LENGTH, radius * side / LENGTH)),
+            constraints=(
+                *problem.fenced(kin, (now.w, radius * side)),
+                *([] if energy is None else [energy]),
+                Tube(now.w.T / LENGTH, radius * side / LENGTH),
+            ),
             tolerance=_TOLERANCE,
             max_iterations=iterations,
             warm=True,

@@ -90,9 +90,9 @@ def starts(
         found = {} if straight is None else {"straight": straight}
     if not found:
         raise InfeasibleError(
-            "no flight was found that stays inside the fence with its margin, keeps "
+            "no flight was found that stays inside the fence, or off ground, by the margin, keeps "
             f"{kin.max_speed:g} m/s and {kin.max_acceleration:g} m/s^2, and ends in time; give "
-            "more flight.duration, a smaller fence.margin or another start or end"
+            "more flight.duration, a smaller margin or another start or end"
         )
     return found
 
