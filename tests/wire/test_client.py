@@ -15,6 +15,7 @@ from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
+from faao_mav.mission import Mission
 from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import download, upload
@@ -252,3 +253,8 @@ def test_a_serial_device_that_takes_no_bytes_is_told(monkeypatch: pytest.MonkeyP
     finally:
         os.close(ours)
         os.close(theirs)
+
+
+def test_an_empty_mission_is_not_uploaded() -> None:
+    with pytest.raises(InputError, match="the mission has no items"):
+        upload(Mission(()), "udpout:127.0.0.1:9")

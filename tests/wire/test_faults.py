@@ -22,13 +22,16 @@ from stations import (
     vehicle_of,
 )
 
+from faao_mav.errors import LinkError
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults
 from faao_mav.sim.lists import StoredLists
-from faao_mav.wire.jobs import upload_parts
+from faao_mav.wire.discover import choose, discover
+from faao_mav.wire.jobs import explain, upload_parts
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
+    Heartbeat,
     MissionCount,
     WireItem,
 )
@@ -234,3 +237,26 @@ def test_what_a_channel_does() -> None:
     assert 1.0 < late <= 3.1
     channel = Channel(Faults(rate=10.0, latency=0.5), "x")
     assert [channel.carry(b"abc", now)[0][0] for now in (1.0, 1.1, 9.0)] == [1.8, 2.1, 9.8]
+
+
+def test_a_vehicle_that_another_station_uploads_to_is_given_up_after_one_attempt() -> None:
+    mock = mock_of(behaviour_of("ardupilot", refusals={(0, COUNT): MavResult.DENIED}))
+    report, took = upload_to(mock, rows_for("ardupilot", 5))
+    assert took < 10
+    told = explain(report, peer_of("ardupilot"))
+    assert told == "mission: refused: DENIED (another ground station is uploading)"
+
+
+@pytest.mark.parametrize(
+    ("mav_type", "autopilot", "name"),
+    [(10, 3, "ArduPilot"), (22, 3, "ArduPilot"), (22, 12, "PX4"), (0, 12, "PX4")],
+)
+def test_a_type_of_vehicle_that_is_not_supported_is_said(
+    mav_type: int, autopilot: int, name: str
+) -> None:
+    search = Script(discover(system=1))
+    search.start(0.0)
+    search.on(Envelope(VEHICLE, Heartbeat(mav_type, autopilot, 0, 0, 3)), 0.5)
+    assert search.outcome is not None
+    with pytest.raises(LinkError, match=f"{name} vehicle of MAV_TYPE {mav_type} .* not supported"):
+        choose(search.outcome, "udpin:0.0.0.0:14550", 1, None, 10.0)

@@ -233,3 +233,13 @@ def test_a_link_that_breaks_in_an_upload_says_what_is_left(
         LinkError, match=r"is gone, while uploading mission at item 1 of 6\. ArduPilot may now hold"
     ):
         upload(a_mission(5), "/dev/ttyACM0", system=1)
+
+
+def test_a_hang_up_is_ignored_where_it_was() -> None:
+    """Under `nohup` a session outlives its terminal."""
+    code = (
+        "import signal, faao_mav.cli.main as main; signal.signal(signal.SIGHUP, signal.SIG_IGN);"
+        "main.app = lambda: print(signal.getsignal(signal.SIGHUP).name); main.run()"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.stdout == "SIG_IGN\n"

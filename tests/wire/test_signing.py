@@ -3,6 +3,7 @@
 import hashlib
 import math
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from faao_mav.errors import InputError, LinkError
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import upload
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.messages import Statustext
+from faao_mav.wire.messages import Heartbeat, Statustext
 from faao_mav.wire.protocol import GROUND_STATION
 from faao_mav.wire.signing import Signing, read_signing, remember
 from faao_mav.wire.transport import Transport, open_transport
@@ -206,3 +207,28 @@ def test_another_key_or_none_is_told_as_such(
         pytest.raises(LinkError, match=told),
     ):
         upload(a_mission(5), connection, signing_key=key_file, wait=2.0)
+
+
+def test_times_of_sent_packets_grow_whatever_the_clock_does() -> None:
+    clock = iter([NOW, NOW, NOW - 1000, NOW - 1000])
+    sender = signing(clock=lambda: next(clock))
+    ticks = [sender.next_tick() for _ in range(3)]
+    assert ticks == [ticks[0], ticks[0] + 1, ticks[0] + 2]
+    heard = signing(clock=lambda: NOW)
+    heard.judge(signed(NOW + 50), VEHICLE)
+    assert heard.next_tick() == ticks[0] + 5_000_001  # the guide: after all that was heard
+
+
+def test_a_heartbeat_is_not_enough_to_be_alive(
+    key_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A vehicle that is signed, and says nothing else: what a recording of heartbeats shows."""
+    codec = Codec(VEHICLE, Signing(KEY))
+
+    def beats(data: bytes | None) -> list[tuple[bytes, str]]:
+        time.sleep(0.02)
+        return [(codec.pack(Heartbeat(2, 12, 0, 0, 3)), "")] if data is None else []
+
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Air(beats, listens=False))
+    with pytest.raises(LinkError, match="no answer to a question that was never asked before"):
+        upload(a_mission(5), "udpout:127.0.0.1:9", system=1, signing_key=key_file)

@@ -131,3 +131,13 @@ def test_packets_come_out_however_a_stream_is_cut(parts: list[bytes], data: st.D
         (0, VEHICLE),
         (253, VEHICLE),
     }
+
+
+def test_who_sends_without_end_is_read_a_burst_at_a_time(
+    udp: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.wire.transport._BURST", 10)
+    peer = udp.peer()
+    for _ in range(25):
+        peer.send(packet_of())
+    assert [len(udp.transport.read(0.05)) for _ in range(3)] == [10, 10, 5]
