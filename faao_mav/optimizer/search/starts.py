@@ -171,7 +171,7 @@ def along(kin: Kinematics, way: Real, fence: Sequence[Constraint]) -> Trajectory
     corners = list(way[1:-1])
     if not fence:
         return _circling_by(kin, corners) if kin.min_speed and corners else with_stops(kin, corners)
-    if kin.min_speed == 0:
+    if kin.min_speed == 0 or not corners:
         flight = with_stops(kin, corners)
         if flight is not None and every_excess(kin, fence, flight) <= ALLOWED:
             return flight
