@@ -183,7 +183,7 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
 
 
 def main(seeds: list[int]) -> None:
-    """Print a row for each site, and what the issue asks for."""
+    """Print a row for each site."""
     gains = []
     with tempfile.TemporaryDirectory() as folder:
         for seed in seeds:
