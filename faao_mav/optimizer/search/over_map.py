@@ -49,8 +49,8 @@ _NEAR = 3.0
 ROUGHLY = _NARROWING[1:2]
 """The search of them that a rough flight has."""
 
-_ITERATIONS = 30
-"""Steps of each of these searches at most. Chosen."""
+_ITERATIONS = 120
+"""Steps of each of these searches at most. Measured: with 30 one of five sites ends 2 % lower."""
 
 _TOLERANCE = 1e-4
 """Their tolerance, bit/s/Hz. Chosen."""
