@@ -128,7 +128,7 @@ def test_a_map_stands_in_the_text_of_a_plan(tmp_path: Path) -> None:
     """Of one hop, by way of a law's file, and with a result that is saved."""
     changes = {"flight.altitude": 70, "radio.ground_user.gain": {"map": "maps/m.npz"}}
     plan = read_plan(mapped(tmp_path, MAP, changes))
-    assert plan.mapped == ((-50.0, -50.0), (350.0, 350.0))
+    assert plan.map_edge == ((-50.0, -50.0), (350.0, 350.0))
     assert parse_plan(plan.text).radio == plan.radio  # without the file
     assert plan.changed({"flight.start": [40, 1]}).radio == plan.radio
     problem = build_problem(plan)
@@ -141,7 +141,7 @@ def test_a_map_stands_in_the_text_of_a_plan(tmp_path: Path) -> None:
     page = render_report(Result(solution))
     assert max(map(len, re.findall("npz:.*", page))) < 100
     law = read_plan(mapped(tmp_path, ABOVE, {"radio.gain": "link.yaml"}))
-    assert law.mapped is None
+    assert law.map_edge is None
     for link in build_problem(law).links:
         assert link.gains.law.db(np.array([30.0]), 40.0) == pytest.approx(-50 - 25 * np.log10(50))
         assert link.gains.above is not None

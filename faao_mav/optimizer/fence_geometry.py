@@ -127,8 +127,8 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
             pieces += parts
             radii += [0.0] * len(parts)
     ends = shapely.points([plan.flight.start, plan.flight.end])
-    if plan.mapped is not None:
-        (west, south), (east, north) = plan.mapped
+    if plan.map_edge is not None:
+        (west, south), (east, north) = plan.map_edge
         sides.append(_sides(shapely.get_coordinates(shapely.box(west, south, east, north))))
     most = plan.max_ground_speed * plan.flight.duration + 2 * plan.margin
     near = [

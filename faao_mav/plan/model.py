@@ -154,9 +154,9 @@ class PlanContents(PlanFile):
 
         The `margin` is not taken off.
         """
-        if not self.geofence and not self.ground and self.mapped is None:
+        if not self.geofence and not self.ground and self.map_edge is None:
             return None
-        return _free_area((*self.zones, *self.ground), self.any_inclusion, self.mapped)
+        return _free_area((*self.zones, *self.ground), self.any_inclusion, self.map_edge)
 
     @property
     def margin(self) -> float:
@@ -167,7 +167,7 @@ class PlanContents(PlanFile):
         return self.mission.path_tolerance if self.fence is None else self.fence.margin
 
     @property
-    def mapped(self) -> tuple[Vector, Vector] | None:
+    def map_edge(self) -> tuple[Vector, Vector] | None:
         """The rectangle where the gains are known, [east, north] m of two corners, the lower first.
 
         None where they are known everywhere; it is empty where maps lie apart.

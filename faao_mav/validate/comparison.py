@@ -81,7 +81,7 @@ def _off_map(plan: Plan, line: Line) -> str:
     """Return where the predicted flight first is in ground or off a map of the gain; "" nowhere."""
     aloft = line.up > plan.flight.altitude - _LOWER
     t, w = line.t[aloft], line.w[aloft]
-    low, high = plan.mapped or ((-np.inf, -np.inf), (np.inf, np.inf))
+    low, high = plan.map_edge or ((-np.inf, -np.inf), (np.inf, np.inf))
     off = ((w < low) | (w > high)).any(axis=1)
     for gone, where in (
         (in_ground(plan.maps, plan.flight.altitude, w), "in the ground under"),
