@@ -313,6 +313,7 @@ def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(Codec, "pack", old)
     in_the_air(monkeypatch, {HERE: a_mock(rate=0.0)})
     assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1).verified
+    hurry(monkeypatch)
     held = holdings("udpin:0.0.0.0:1", system=1)
     assert len(held.mission.items) == 5
     assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about

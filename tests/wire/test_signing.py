@@ -230,5 +230,6 @@ def test_a_heartbeat_is_not_enough_to_be_alive(
         return [(codec.pack(Heartbeat(2, 12, 0, 0, 3)), "")] if data is None else []
 
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Air(beats, listens=False))
+    hurry(monkeypatch)
     with pytest.raises(LinkError, match="no answer to a question that was never asked before"):
         upload(a_mission(5), "udpout:127.0.0.1:9", system=1, signing_key=key_file)
