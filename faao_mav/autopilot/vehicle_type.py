@@ -42,7 +42,8 @@ class AutopilotFamily:
     manners: Manners = field(default_factory=Manners)
     has_submodes: bool = False  # Its custom modes are told as main and sub mode, bytes 2 and 3
     setpoints: SetpointRules = field(default_factory=SetpointRules)  # How it is flown by setpoints
-    earth_radius: float | None = None  # Of the sphere of its local frame, m; None: WGS84
+    # The frame in which it takes them, about its origin in degrees
+    local_frame: Callable[[float, float], LocalFrame] = LocalFrame
     # Whole numbers among its parameters are sent as their 32 bits, and only what is sent with the
     # right type is set
     whole_as_bits: bool = False
@@ -58,10 +59,6 @@ class AutopilotFamily:
         """
         main, sub = (mode >> 16 & 255, mode >> 24) if self.has_submodes else (mode, 0)
         return 1.0, float(main), float(sub)
-
-    def local_frame(self, latitude: float, longitude: float) -> LocalFrame:
-        """Return the frame in which it takes setpoints, about its origin in degrees."""
-        return LocalFrame(latitude, longitude, self.earth_radius)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,50 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from faao_mav.arrays import Real
 from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule
 from faao_mav.autopilot.parameter import ParameterValues, rule
 from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse, VehicleType
+from faao_mav.geodesy import LocalFrame
+
+_DEGREE = 111_318.84502145034
+"""ArduPilot's degree of latitude, m; times the cosine of the latitude one of longitude."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlatFrame(LocalFrame):
+    """ArduPilot's flat Earth: degrees times a length, those of longitude shrunk by cos(latitude).
+
+    The latitude is the mean of the position's and the origin's. Over 500 m that is up to 2 m from
+    WGS84.
+
+    >>> frame = FlatFrame(-35.363262, 149.165237)
+    >>> frame.to_local(-35.360107, 149.165237).round(2)
+    array([  0.  , 351.21])
+    """
+
+    def to_local(self, latitude: ArrayLike, longitude: ArrayLike) -> Real:
+        """Return positions (..., 2) in metres."""
+        lat, turned = np.asarray(latitude, dtype=float), np.asarray(longitude) - self.longitude
+        east = self._shrunk(lat) * ((turned + 180) % 360 - 180)
+        return _DEGREE * np.stack([east, lat - self.latitude], axis=-1)
+
+    def to_geodetic(self, positions: ArrayLike) -> tuple[Real, Real]:
+        """Return latitude and longitude in degrees."""
+        east, north = np.moveaxis(np.asarray(positions, dtype=float) / _DEGREE, -1, 0)
+        lat = self.latitude + north
+        return lat, (self.longitude + east / self._shrunk(lat) + 180) % 360 - 180
+
+    def _shrunk(self, latitude: Real) -> Real:
+        return np.asarray(np.cos(np.radians((latitude + self.latitude) / 2)))
+
 
 ARDUPILOT = AutopilotFamily(
     key="ardupilot",
@@ -40,9 +78,7 @@ ARDUPILOT = AutopilotFamily(
         carries_on=True,
         defaults={"GUID_TIMEOUT": 3.0},
     ),
-    # Degrees of latitude are 111,318.845 m, those of longitude as many times the cosine of the mean
-    # latitude: within 1 km that is this sphere to 0.14 m up to 60 degrees, and WGS84 4 m off
-    earth_radius=6_378_100.0,
+    local_frame=FlatFrame,
     mavlink_2="SERIALn_PROTOCOL 2",
     only_one_station=(
         "where it takes orders of only MAV_GCS_SYSID (SYSID_ENFORCE, MAV_OPTIONS), give that "

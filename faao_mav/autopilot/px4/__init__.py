@@ -27,6 +27,10 @@ from faao_mav.autopilot.vehicle_type import (
     FenceResponse,
     VehicleType,
 )
+from faao_mav.geodesy import LocalFrame
+
+_RADIUS = 6_371_000.0
+"""The radius of PX4's Earth, m."""
 
 
 def px4_mode(main: int, sub: int) -> int:
@@ -73,7 +77,7 @@ PX4 = AutopilotFamily(
         streamed=1.0,
         defaults={"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 0},
     ),
-    earth_radius=6_371_000.0,
+    local_frame=lambda latitude, longitude: LocalFrame(latitude, longitude, _RADIUS),
     whole_as_bits=True,
     mavlink_2="MAV_PROTO_VER 2",
 )
