@@ -90,16 +90,17 @@ def direct(
     routes = _routes(problem, before, known, field, alone=alone)
     tell(1, "the starts", 0.0)
     steps = problem.plan.optimizer.max_iterations * _LONG_SEARCH
-    improved, going = dict(routes), list(routes)
-    if len(routes) > 1 and not problem.mapped:  # a single start needs no comparison
+    improved, going = routes, list(routes)
+    values = [value(flight) for flight in routes.values()]
+    if problem.mapped:
+        going.sort(key=dict(zip(routes, values, strict=True)).__getitem__, reverse=True)
+        del going[_FOLLOWED:]
+    elif len(routes) > 1:  # a single start needs no comparison
         improved, going = improve_starts(problem, field, routes, steps)
     flights = [*routes.values(), *improved.values()]
-    values = [value(flight) for flight in flights]
+    values += [value(each) for each in improved.values()] if improved is not routes else values
     best_yet = int(np.argmax(values))
     tell(2, "the best start", values[best_yet])
-    if problem.mapped:
-        going.sort(key=lambda name: value(routes[name]), reverse=True)
-        del going[_FOLLOWED:]
     starts = [improved[name] for name in going]
     if best_yet < len(routes) and not problem.mapped:  # no start was improved as far
         starts.append(flights[best_yet])
