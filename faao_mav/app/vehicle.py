@@ -62,7 +62,6 @@ def uploaded(tell: Tell, look: Callable[[], None], result: Result, connection: s
     """
     from faao_mav.fly.seen import Flight
     from faao_mav.wire.client import upload
-    from faao_mav.wire.upload_text import upload_text
 
     def observe(what: str, done: int, total: int) -> None:
         look()
@@ -77,7 +76,7 @@ def uploaded(tell: Tell, look: Callable[[], None], result: Result, connection: s
         note=lambda text: tell({"note": text}),
     )
     tell({"doing": ""})
-    told = upload_text(report)
+    told = str(report)
     return told if report.verified else f"{told}\nthe mission is not verified; do not fly it"
 
 

@@ -95,7 +95,6 @@ def plan(
     uploaded, failure = None, None
     if upload is not None and sound and result.conversion is not None:
         from faao_mav.fly.seen import Flight
-        from faao_mav.wire.upload_text import upload_text
 
         flight = Flight.planned(result.conversion, result.solution)
         options = {"system": system, "allow_armed": allow_armed, "made_for": flight.made_for}
@@ -108,7 +107,7 @@ def plan(
             lambda: result.as_dict() | {"upload": as_dict(uploaded) if uploaded else None},
             lambda: [
                 summary(result, written, precoders, verbose=verbose),
-                *([upload_text(uploaded)] if uploaded else []),
+                *([str(uploaded)] if uploaded else []),
             ],
             as_json=as_json,
         )

@@ -26,7 +26,7 @@ from faao_mav.cli.shared import (
 
 if TYPE_CHECKING:
     from faao_mav.mission.item import Mission
-    from faao_mav.wire.client import UploadReport
+    from faao_mav.wire.jobs import UploadReport
 
 
 @with_link
@@ -58,7 +58,6 @@ def upload(
     from faao_mav.autopilot.files import made_for
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.wire.parameters import check_settable
-    from faao_mav.wire.upload_text import upload_text
 
     file = read_noted(mission_file)
     values = None if parameters is None else read_parameters(parameters)
@@ -73,7 +72,7 @@ def upload(
         clear_rest=clear_rest,
         **link,
     )
-    show(lambda: as_dict(report), lambda: [upload_text(report)], as_json=as_json)
+    show(lambda: as_dict(report), lambda: [str(report)], as_json=as_json)
     if not report.verified:
         raise typer.Exit(1)
 

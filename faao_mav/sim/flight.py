@@ -27,9 +27,6 @@ from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.follower import Follower
 from faao_mav.wire.messages import SetPositionTargetLocalNed
 
-_FIRST_DO = 176
-"""The first command that is done at once; those before take time."""
-
 _FARTHEST = 1e6
 """Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen."""
 
@@ -132,9 +129,10 @@ class Flight:
                 self._track = self._fly(mission, vehicle)
             except InputError:
                 return False
-            self._pending, self._fence = _reached(self._track, mission), mission.fence
+            self._fence = mission.fence
             self._outside = self.is_outside(self._fence, self.aircraft.at(now).position)
-            self._since = self._pending[0][0] if flies and self._pending else 0.0
+            done = self._track.reached[np.isfinite(self._track.reached)]
+            self._since = float(done.min()) if flies and len(done) else 0.0
         track, here = self._track, self.aircraft.at(now).position
         k = min(int(np.searchsorted(track.t, self._since)), len(track.t) - 1)
         way = float(np.linalg.norm(track.position[k] - here)) if flies else 0.0
@@ -144,14 +142,6 @@ class Flight:
         self.aircraft.play(times, places, np.append(items[0], items))
         self._follows, self.on_mission = False, True
         return True
-
-    def reached(self, now: float) -> list[int]:
-        """Return the items of the mission that were reached since the last call."""
-        if not self.on_mission:
-            return []
-        due = [number for time, number in self._pending if self._begun + time <= now]
-        self._pending = self._pending[len(due) :]
-        return due
 
     def leaves_fence(self, now: float) -> bool:
         """Do what is to be done where a mission leaves the fence; tell that, once."""
@@ -231,13 +221,3 @@ class Flight:
         """Tell whether there was no setpoint for as long as its parameter allows."""
         allowed = max(self._values.get(self.rules.timeout, 0.0), self.rules.least_timeout)
         return now - self._last_heard > allowed
-
-
-def _reached(track: Track, mission: Mission) -> list[tuple[float, int]]:
-    """Return when items are reached, s on `track`, and the numbers that are told, in order.
-
-    Where a DO follows an item, both autopilots tell the number of the DO.
-    """
-    do = [item.command >= _FIRST_DO for item in mission.items[1:]] + [False]
-    done = enumerate(track.reached[: len(do)])
-    return sorted((float(t), index + do[index]) for index, t in done if math.isfinite(t))

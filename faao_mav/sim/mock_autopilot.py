@@ -13,7 +13,6 @@ from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.behaviour import Behaviour, whole
 from faao_mav.sim.flight import Flight
-from faao_mav.sim.follower import Posture
 from faao_mav.sim.lists import StoredLists
 from faao_mav.sim.parameter_protocol import ParameterServer
 from faao_mav.wire import messages, protocol
@@ -22,20 +21,18 @@ from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext
 from faao_mav.wire.protocol import Address, MavCommand, MavSeverity, MavState, MissionType
 from faao_mav.wire.wire_items import home_items, mission_of
 
-ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
+_ACCEPTED, _DENIED, _UNSUPPORTED, _FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
 
-_SET_MODE = 11
-"""The number of SET_MODE."""
-
-_CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
-"""MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
+_SET_MODE, _CUSTOM_MODE, _AUTO = 11, 1, 4 | 8 | 16
+"""The number of SET_MODE; and MAV_MODE_FLAG: a custom mode is set; automatic, guided and
+stabilised."""
 
 _LATE = 0.05
 """Seconds by which `tick` is overdue that make a sped up flight stand still; chosen."""
 
-# MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY
-_CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
+_CAPABILITIES, _VERSION = 1 | 4 | 8 | 8192 | 16_384 | 32_768, 0x04_06_00_FF
+"""MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY; a release."""
 
 
 class MockAutopilot(Machine[None]):
@@ -117,11 +114,6 @@ class MockAutopilot(Machine[None]):
         self.flight.stop()
         self._current, self._booted = 0, now
 
-    def posture(self, now: float) -> Posture:
-        """Return where the aircraft is."""
-        self._now = max(now, self._now)
-        return self.flight.aircraft.at(self._clock)
-
     def mission(self) -> Mission:
         """Return what is stored, as a mission."""
         return mission_of({part: self.lists.items(part) for part in MissionType}, self.vehicle)
@@ -186,8 +178,7 @@ class MockAutopilot(Machine[None]):
     def _follow(self) -> list[Message]:
         """Let the flight go on, and tell what becomes of it."""
         flight, clock, first = self.flight, self._clock, self._first
-        out: list[Message] = [messages.MissionItemReached(n + first) for n in flight.reached(clock)]
-        before = flight.mode
+        before, out = flight.mode, list[Message]()
         if flight.leaves_fence(clock):
             out.append(Statustext(MavSeverity.CRITICAL, "Polygon fence breached"))
         flight.lose_setpoints(clock)
@@ -242,8 +233,10 @@ class MockAutopilot(Machine[None]):
         if sender == own or not (own.takes(target) or as_planner.takes(target)):
             return ()
         match message:
-            case CommandLong():
-                return self._on_command(sender, message)
+            case CommandLong(command=command):
+                answers = list[Message]()
+                result = self._obey(message, answers)
+                return [messages.CommandAck(sender, command, result), *answers]
             case messages.SetMode(custom_mode=mode):
                 return [messages.CommandAck(sender, _SET_MODE, self._set_mode(mode))]
             case messages.ParamRequestList() | messages.ParamRequestRead() | messages.ParamSet():
@@ -255,37 +248,37 @@ class MockAutopilot(Machine[None]):
                 return self.lists.on(sender, message, now)
         return ()
 
-    def _on_command(self, sender: Address, command: CommandLong) -> list[Message]:
-        result, answers = ACCEPTED, list[Message]()
+    def _obey(self, command: CommandLong, answers: list[Message]) -> int:
+        """Do what `command` asks for, add what it says to `answers`, and return its MAV_RESULT."""
         match command.command:
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5)
                 why = self._why_not_armed() if result == self.behaviour.denied else None
                 if why is not None:
                     answers.append(Statustext(MavSeverity.CRITICAL, f"Arm: {why}"))
+                return result
             case MavCommand.TAKEOFF:
                 climbs = self.flight.take_off(command.param7, self._clock)
-                result = ACCEPTED if climbs else DENIED
-            case MavCommand.START if not self._knows_place():
-                result = FAILED
+                return _ACCEPTED if climbs else _DENIED
             case MavCommand.START:
+                if not self._knows_place():
+                    return _FAILED
                 self.flight.enter(self.flight.modes.mission, self._clock)
-                result = self._begin()
+                return self._begin()
             case MavCommand.SET_MODE:
                 flags, main, sub = map(whole, (command.param1, command.param2, command.param3))
                 custom = flags > 0 and flags & _CUSTOM_MODE
                 mode = self.behaviour.requested_mode(main, sub) if custom else None
-                result = self.behaviour.no_mode if mode is None else self._set_mode(mode)
+                return self.behaviour.no_mode if mode is None else self._set_mode(mode)
             case MavCommand.SET_CURRENT:
-                number, rows = whole(command.param1), self.lists.items(MissionType.MISSION)
-                if number not in range(len(rows)):
-                    result = DENIED
-                else:
-                    self._current = number
-                    answers.append(self._mission_current())
+                number = whole(command.param1)
+                if number not in range(len(self.lists.items(MissionType.MISSION))):
+                    return _DENIED
+                self._current = number
+                answers.append(self._mission_current())
             case MavCommand.REQUEST_MESSAGE:
                 answers += self._asked_for(whole(command.param1))
-                result = ACCEPTED if answers else UNSUPPORTED
+                return _ACCEPTED if answers else _UNSUPPORTED
             case MavCommand.SET_INTERVAL if command.param1 == protocol.CURRENT_MODE:
                 self._tells_asked_mode = bool(self.flight.rules.loss)
             case MavCommand.SET_INTERVAL:
@@ -295,16 +288,15 @@ class MockAutopilot(Machine[None]):
             case MavCommand.REBOOT:
                 self.reboot(self._now)
             case _:
-                result = UNSUPPORTED
-        return [messages.CommandAck(sender, command.command, result), *answers]
+                return _UNSUPPORTED
+        return _ACCEPTED
 
     def _asked_for(self, kind: int) -> list[Message]:
         home = self.home
         spot = round(home.latitude * 1e7), round(home.longitude * 1e7), round(home.altitude * 1000)
         match kind:
             case protocol.AUTOPILOT_VERSION:
-                version = 0x04_06_00_FF
-                return [messages.AutopilotVersion(_CAPABILITIES, version, self.address.system)]
+                return [messages.AutopilotVersion(_CAPABILITIES, _VERSION, self.address.system)]
             case protocol.POSITION:
                 return self._place_reports()[:1]
             case protocol.HOME_POSITION:
@@ -316,12 +308,12 @@ class MockAutopilot(Machine[None]):
     def _arm(self, wanted: bool) -> int:
         if not wanted:
             self.flight.stop()
-            return ACCEPTED
+            return _ACCEPTED
         if self._why_not_armed() is not None:
             return self.behaviour.denied
         if not self.armed:
             self.flight.arm(self._clock)
-        return self._begin() if self.mode == self.flight.modes.mission else ACCEPTED
+        return self._begin() if self.mode == self.flight.modes.mission else _ACCEPTED
 
     def _why_not_armed(self) -> str | None:
         """Return what it says when it does not arm, None if it does."""
@@ -343,7 +335,7 @@ class MockAutopilot(Machine[None]):
         if mode == modes.guided and not self.flight.accepts_guided(clock):
             return self.behaviour.denied
         self.flight.enter(mode, clock)
-        return self._begin() if mode == modes.mission else ACCEPTED
+        return self._begin() if mode == modes.mission else _ACCEPTED
 
     def _problem(self) -> str:
         """Return why what is stored cannot be flown, "" if it can."""
@@ -356,9 +348,9 @@ class MockAutopilot(Machine[None]):
     def _begin(self) -> int:
         """Fly the mission, once armed and told to; not a second time."""
         if self._problem():
-            return DENIED
+            return _DENIED
         mission = replace(self.mission(), home=self.home)
-        return ACCEPTED if self.flight.begin(mission, self._clock) else DENIED
+        return _ACCEPTED if self.flight.begin(mission, self._clock) else _DENIED
 
 
 def _fitted(value: float, bits: int) -> int:

@@ -13,11 +13,18 @@ from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.jobs import Lists, download_lists, explain, upload_parts, what_is_left
+from faao_mav.wire.jobs import (
+    Lists,
+    UploadReport,
+    download_lists,
+    explain,
+    upload_parts,
+    what_is_left,
+)
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition
-from faao_mav.wire.parameters import Change, check_settable, set_parameters
+from faao_mav.wire.parameters import check_settable, set_parameters
 from faao_mav.wire.protocol import (
     GROUND_STATION,
     HOME_POSITION,
@@ -67,27 +74,6 @@ class LinkOptions(TypedDict, total=False):
     wait: float
     observe: Observe | None
     note: Callable[[str], object] | None
-
-
-@dataclass(frozen=True, slots=True)
-class UploadReport:
-    """What became of an upload: one report for each list, `seconds` in all.
-
-    `stands` is where the vehicle stands beside the mission, None where it does not tell; `changes`
-    are the parameters that were set.
-    """
-
-    vehicle: FoundVehicle
-    parts: tuple[PartReport, ...]
-    seconds: float
-    problems: tuple[str, ...]
-    stands: Whereabouts | None = None
-    changes: tuple[Change, ...] = ()
-
-    @property
-    def verified(self) -> bool:
-        """Whether everything is on the vehicle, whole and equal."""
-        return not self.problems
 
 
 def upload(

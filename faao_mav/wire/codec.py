@@ -18,11 +18,10 @@ _KINDS: dict[str, type[Message]] = {
 """Message types by their MAVLink names."""
 
 _NAMES = {kind: name for name, kind in _KINDS.items()}
-_LEGACY = "MISSION_REQUEST"
-"""The predecessor of MISSION_REQUEST_INT, with the same fields."""
 
-_BEYOND = ("opaque_id", "mission_id")
-"""Fields behind those that the dialects of pymavlink know, of 4 bytes."""
+_LEGACY, _BEYOND = "MISSION_REQUEST", ("opaque_id", "mission_id")
+"""The predecessor of MISSION_REQUEST_INT, with the same fields; and fields of 4 bytes behind those
+that the dialects of pymavlink know."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,25 +86,23 @@ class Codec:
 
     def parse(self, data: bytes, origin: str = "") -> list[Packet]:
         """Return the packets in `data`, from `origin`; damaged or cut off ones are passed over."""
-        found = [self._parse_one(packet, origin) for packet in Framer().feed(data)]
-        return [packet for packet in found if packet is not None]
-
-    def _parse_one(self, raw: bytes, origin: str) -> Packet | None:
-        try:
-            message = self._reader.decode(bytearray(raw))
-        except self._dialect.MAVError:
-            return None
-        sender = sender_of(raw)
-        verdict: Verdict = "signed" if is_signed(raw) else "unsigned"
-        if self._signing is not None:
-            verdict = self._signing.judge(raw, sender)
-        if payload_of(raw) is not None:
-            self.modern.add(sender)
-        envelope = _envelope(message, raw, origin)
-        if envelope is not None:
-            self.heard.add(verdict)
-        passed_over = self._signing is not None and verdict != "signed"
-        return None if passed_over else Packet(raw, envelope)
+        found = []
+        for raw in Framer().feed(data):
+            try:
+                message = self._reader.decode(bytearray(raw))
+            except self._dialect.MAVError:
+                continue
+            verdict: Verdict = "signed" if is_signed(raw) else "unsigned"
+            if self._signing is not None:
+                verdict = self._signing.judge(raw, sender_of(raw))
+            if payload_of(raw) is not None:
+                self.modern.add(sender_of(raw))
+            envelope = _envelope(message, raw, origin)
+            if envelope is not None:
+                self.heard.add(verdict)
+            if self._signing is None or verdict == "signed":
+                found.append(Packet(raw, envelope))
+        return found
 
 
 def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
@@ -128,8 +125,9 @@ def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
             case "item":
                 p = packet
                 params = (p.param1, p.param2, p.param3, p.param4)
-                flags = (p.current, p.autocontinue)
-                value = WireItem(p.command, p.frame, params, p.x, p.y, p.z, *flags)
+                value = WireItem(
+                    p.command, p.frame, params, p.x, p.y, p.z, p.current, p.autocontinue
+                )
             case plain:
                 value = getattr(packet, plain)
                 if isinstance(value, str):  # on one line: what moves a terminal's cursor is blank

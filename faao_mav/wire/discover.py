@@ -175,6 +175,6 @@ def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
     vehicle = vehicle_type_by_numbers(heartbeat.autopilot, heartbeat.type)
     family = next((f for f in families().values() if f.mav_autopilot == heartbeat.autopilot), None)
     kind = kind_by_number(heartbeat.type) or f"vehicle of MAV_TYPE {heartbeat.type}"
-    # UNINIT is what simple vehicles say that do not tell their state.
+    # MAV_STATE_UNINIT is what simple vehicles say that do not tell their state.
     ready = heartbeat.system_status not in (MavState.BOOT, MavState.CALIBRATING)
     return FoundVehicle(sender, vehicle, family, kind, heartbeat.armed, ready)

@@ -1,11 +1,14 @@
 """Whole jobs on a vehicle, as talks: upload, clear and verify, download everything; in words."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from faao_mav.mission.item import Mission
+from faao_mav.wire.discover import FoundVehicle
 from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import WireItem
+from faao_mav.wire.parameters import Change
 from faao_mav.wire.protocol import MavResult, MissionType, listed, meaning
 from faao_mav.wire.transfer import (
     ATTEMPTS,
@@ -17,10 +20,64 @@ from faao_mav.wire.transfer import (
     send_list,
 )
 from faao_mav.wire.verify import compare
+from faao_mav.wire.whereabouts import Whereabouts
 from faao_mav.wire.wire_items import autopilot_name, home_items
 
 _ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
 """What a vehicle answers that has no such list at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class UploadReport:
+    """What became of an upload: one report for each list, `seconds` in all.
+
+    `stands` is where the vehicle stands beside the mission, None where it does not tell; `changes`
+    are the parameters that were set.
+    """
+
+    vehicle: FoundVehicle
+    parts: tuple[PartReport, ...]
+    seconds: float
+    problems: tuple[str, ...]
+    stands: Whereabouts | None = None
+    changes: tuple[Change, ...] = ()
+
+    @property
+    def verified(self) -> bool:
+        """Whether everything is on the vehicle, whole and equal."""
+        return not self.problems
+
+    def __str__(self) -> str:
+        """Return it for people, in lines."""
+        stands = "not known how far from the mission's home: it does not tell where it is"
+        if self.stands is not None:
+            stands = f"{self.stands}{'' if self.stands.is_meant else ': it is not armed there'}"
+        lines = [f"vehicle      {self.vehicle}", f"stands       {stands}"]
+        lines += [f"parameter    {change}" for change in self.changes]
+        lines += [_stored(part) for part in self.parts if part.verified]
+        lines += [f"not kept     {text}" for part in self.parts for text in _dropped(part)]
+        lines += [f"failed       {problem}" for problem in self.problems]
+        if self.verified:
+            took = f"the upload took {self.seconds:.1f} s"
+            lines.append(f"verified     read back and compared; {took}")
+        return "\n".join(lines)
+
+
+def _stored(part: PartReport) -> str:
+    title = {"rally points": "rally"}.get(part.part.title, part.part.title)
+    again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
+    return f"{title:<13}{part.items} item{'s' * (part.items != 1)} stored{again}"
+
+
+def _dropped(part: PartReport) -> list[str]:
+    """Return what storage lost, one line for each field."""
+    lost = [each for each in part.differences if each.kind == "dropped"]
+    fields = Counter(each.field for each in lost)
+    firsts = {each.field: each for each in reversed(lost)}
+    return [
+        str(firsts[field]) + (f" (and so in {count - 1} more items)" if count > 1 else "")
+        for field, count in fields.items()
+    ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,15 @@
 """A machine on a real link, and the log of what passes it."""
 
-import os
 import secrets
 import struct
 import time
 from collections.abc import Callable, Sequence
 from io import FileIO
 from pathlib import Path
-from typing import Self, TypeAlias, TypeVar
+from typing import Any, Self, TypeAlias, TypeVar
 
-from faao_mav.errors import HangUp, InputError, LinkError
-from faao_mav.files import check_writable
+from faao_mav.errors import HangUp, LinkError
+from faao_mav.files import check_ending, check_writable
 from faao_mav.wire.codec import Codec, Packet
 from faao_mav.wire.framing import message_id, sender_of
 from faao_mav.wire.machine import Machine, Script, Talk
@@ -34,43 +33,43 @@ _BEAT = 1.0
 """Seconds between two heartbeats, what the MAVLink guide asks for, and between two looks at how
 far a machine is."""
 
-_SHOWN = 3
-"""Other origins of the vehicle's packets that are told, at most; chosen."""
-
-_SETUP_SIGNING = 256
-"""The number of the message SETUP_SIGNING."""
+_SHOWN, _SETUP_SIGNING = 3, 256
+"""Other origins of the vehicle's packets that are told, at most: chosen; the number of the message
+SETUP_SIGNING."""
 
 
 class Tlog:
     """A `.tlog` file: before each packet the time since 1970, 8 bytes, big-endian, microseconds.
 
     MAVProxy and Mission Planner write and read such files. Only its owner may read this one, and it
-    holds no SETUP_SIGNING, which carries a key. An older log of the name stays until the first
-    packet is received. `failure` says why the log ends early, if it does: the link goes on.
+    holds no SETUP_SIGNING, which carries a key. It begins with the first packet that is received:
+    until then an older log of the name stays. `failure` says why the log ends early, if it does:
+    the link goes on.
 
     Raises `InputError` if the file cannot be written, or by its name is none of these: a slip of
     the pen must not replace the mission.
     """
 
     def __init__(self, path: Path) -> None:
-        if path.suffix != ".tlog":
-            raise InputError(f"--log {path}: give a name that ends in .tlog")
+        check_ending(path, "--log", (".tlog",))
         check_writable(path)
         self.failure: str | None = None
         self._path = path
         self._file: FileIO | None = None
-        self._waiting = b""
 
     def write(self, packet: bytes, *, received: bool) -> None:
         """Append `packet`, sent or received now."""
-        if self.failure is not None or message_id(packet) == _SETUP_SIGNING:
+        begun = received or self._file is not None
+        if self.failure is not None or not begun or message_id(packet) == _SETUP_SIGNING:
             return
-        self._waiting += struct.pack(">Q", int(time.time() * 1e6)) + packet
+        entry = struct.pack(">Q", int(time.time() * 1e6)) + packet
         try:
-            if received and self._file is None:
-                self._file = FileIO(self._path, "w", opener=_open_for_owner)
-            while self._file is not None and self._waiting:
-                self._waiting = self._waiting[self._file.write(self._waiting) :]
+            if self._file is None:
+                self._path.touch(mode=0o600)
+                self._path.chmod(0o600)
+                self._file = self._path.open("wb", buffering=0)
+            while entry:
+                entry = entry[self._file.write(entry) :]
         except OSError as error:
             self.failure = f"{self._path}: cannot be written: {error.strerror}; the log ends early"
 
@@ -78,13 +77,6 @@ class Tlog:
         """Close the file."""
         if self._file is not None:
             self._file.close()
-
-
-def _open_for_owner(path: str, flags: int) -> int:
-    """Open a file that only its owner may read, also one that was there and others might read."""
-    handle = os.open(path, flags, mode=0o600)
-    Path(path).chmod(0o600)
-    return handle
 
 
 class WireLink:
@@ -188,11 +180,11 @@ class WireLink:
                 self._send(machine.cancel(time.monotonic()))
         return outcome
 
-    def begin(self, machine: Machine[T]) -> None:
+    def begin(self, machine: Machine[Any]) -> None:
         """Start `machine`; `step` then carries it on."""
         self._send(machine.start(time.monotonic()))
 
-    def step(self, machine: Machine[T], until: float) -> None:
+    def step(self, machine: Machine[Any], until: float) -> None:
         """Feed `machine` with what arrives first: packets, its deadline or the time `until`."""
         due = machine.deadline
         until = until if due is None else min(due, until)
@@ -202,10 +194,9 @@ class WireLink:
                     continue
                 if self.log is not None:
                     self.log.write(packet.raw, received=True)
-                if packet.envelope is not None and machine.outcome is None:
+                if packet.envelope is not None:
                     self._send(machine.on(packet.envelope, time.monotonic()), origin)
-        if machine.outcome is None:
-            self._send(machine.tick(time.monotonic()))
+        self._send(machine.tick(time.monotonic()))
 
     def _counts(self, packet: Packet, origin: Origin) -> bool:
         """Tell whether `packet` counts: no own heartbeat that comes back; for others see `bind`."""

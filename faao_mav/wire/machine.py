@@ -83,11 +83,6 @@ class Line:
         """Send `messages`."""
         self.said += messages
 
-    def sent(self) -> list[Message]:
-        """Return what was said since the last call."""
-        said, self.said = self.said, []
-        return said
-
 
 Talk: TypeAlias = Generator[float, Line, T]
 """A conversation: it yields until when it waits, s, and is sent its line when something is heard or
@@ -136,7 +131,7 @@ class Script(Machine[T]):
         """Close the talk: there is no outcome."""
         self._due = math.inf
         self._talk.close()
-        return self._line.sent()
+        return self._sent()
 
     def _carry_on(self, heard: Envelope | None, now: float) -> Sequence[Message]:
         self._line.now, self._due = now, AT_ONCE
@@ -146,4 +141,8 @@ class Script(Machine[T]):
                 self._due = self._talk.send(self._line)
         except StopIteration as end:
             self.outcome = end.value
-        return self._line.sent()
+        return self._sent()
+
+    def _sent(self) -> list[Message]:
+        said, self._line.said = self._line.said, []
+        return said

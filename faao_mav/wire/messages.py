@@ -109,12 +109,6 @@ class CurrentMode(Message):
     intended_custom_mode: int
 
 
-class MissionItemReached(Message):
-    """MISSION_ITEM_REACHED."""
-
-    seq: int
-
-
 class CommandLong(Addressed):
     """COMMAND_LONG."""
 

@@ -21,10 +21,6 @@ class MissionType(IntEnum):
         return ("mission", "fence", "rally points")[self]
 
 
-ALL_TYPES = 255
-"""MAV_MISSION_TYPE_ALL: valid in MISSION_CLEAR_ALL only."""
-
-
 class MavResult(IntEnum):
     """MAV_MISSION_RESULT: how a transfer went."""
 
@@ -132,38 +128,26 @@ AUTOPILOT_VERSION, HOME_POSITION, CURRENT_MODE = 148, 242, 436
 """The numbers of SYS_STATUS, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, MISSION_CURRENT,
 GPS_GLOBAL_ORIGIN, AUTOPILOT_VERSION, HOME_POSITION and CURRENT_MODE."""
 
-GROUND_STATION_TYPE, COMPANION_TYPE = 6, 18
-"""MAV_TYPE_GCS and MAV_TYPE_ONBOARD_CONTROLLER."""
+ALL_TYPES, GROUND_STATION_TYPE, COMPANION_TYPE, NO_AUTOPILOT = 255, 6, 18, 8
+"""MAV_MISSION_TYPE_ALL; MAV_TYPE_GCS and MAV_TYPE_ONBOARD_CONTROLLER; MAV_AUTOPILOT_INVALID: what
+ground stations and other components say that they are."""
+
+ARMED, PREARM_CHECK, MISSION_COMPLETE = 128, 1 << 28, 5
+"""MAV_MODE_FLAG_SAFETY_ARMED in a heartbeat's base_mode, MAV_SYS_STATUS_PREARM_CHECK in the health
+of the sensors in SYS_STATUS, MISSION_STATE_COMPLETE in MISSION_CURRENT."""
 
 AIRFRAMES = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43, 46, 47})
 """MAV_TYPE of what an autopilot moves. All others are beside one: ground stations, companions,
 gimbals, cameras, ADS-B and remote identification, antenna trackers, parachutes, radios."""
 
 
-NO_AUTOPILOT = 8
-"""MAV_AUTOPILOT_INVALID: what ground stations and other components say that they are."""
-
-
 class MavState(IntEnum):
     """MAV_STATE: below `STANDBY` a vehicle does not take missions yet."""
 
-    UNINIT = 0
     BOOT = 1
     CALIBRATING = 2
     STANDBY = 3
     ACTIVE = 4
-    CRITICAL = 5
-
-
-ARMED = 128
-"""MAV_MODE_FLAG_SAFETY_ARMED, in a heartbeat's base_mode."""
-
-
-PREARM_CHECK = 1 << 28
-"""MAV_SYS_STATUS_PREARM_CHECK, in the sensors' health of SYS_STATUS."""
-
-MISSION_COMPLETE = 5
-"""MISSION_STATE_COMPLETE, in MISSION_CURRENT."""
 
 
 @dataclass(frozen=True, slots=True, order=True)

@@ -11,7 +11,6 @@ from faao_mav.wire.protocol import Address, MavCommand
 K = TypeVar("K")
 T = TypeVar("T")
 
-
 SILENCE = 9.0
 """Seconds that a transfer may get no further: PX4 asks again for 5 s, ArduPilot for 8 s."""
 
@@ -19,15 +18,13 @@ _FIRST, SLOWEST = 0.25, 1.5
 """Seconds after which a question is put again while it is not known how long answers take, and at
 the latest: the guide's."""
 
-_QUICKEST = 0.02
+_QUICKEST, _LONGEST = 0.02, 0.5
 """Seconds after which it is put again at the earliest: vehicles answer in the turns of their main
-loop, of which the slowest (ArduPlane's) has 50 a second."""
+loop, of which the slowest (ArduPlane's) has 50 a second; and at the latest on a quick link: chosen.
+"""
 
 _GROWTH = 1.25
 """By how much the wait grows with each question that has to be put again; chosen."""
-
-_LONGEST = 0.5
-"""The longest time after which a question is put again on a quick link, s; chosen."""
 
 
 class Pace:
@@ -59,7 +56,7 @@ class Pace:
 
 
 @dataclass(slots=True)
-class Question:
+class _Question:
     """What is said when it is late; when it was put last, s, and how often."""
 
     again: tuple[Message, ...] = ()
@@ -75,7 +72,7 @@ class Questions(Generic[K]):
 
     def __init__(self, line: Line, pace: Pace, silence: float) -> None:
         self._line, self.pace, self._silence = line, pace, silence
-        self.asked: dict[K, Question] = {}
+        self.asked: dict[K, _Question] = {}
         self.until = line.now + silence
 
     @property
@@ -89,7 +86,7 @@ class Questions(Generic[K]):
 
     def put(self, key: K, *messages: Message, again: tuple[Message, ...] = ()) -> None:
         """Put a question, or one under way once more; `again` is said instead once it is late."""
-        question = self.asked.setdefault(key, Question())
+        question = self.asked.setdefault(key, _Question())
         question.again, question.sent = again or messages, self._line.now
         question.times += 1
         self._line.say(*messages)
@@ -101,27 +98,22 @@ class Questions(Generic[K]):
     def answer(self, key: K) -> bool:
         """Note that a question is answered; tell whether it was under way."""
         question = self.asked.pop(key, None)
-        if question is None:
-            return False
-        if question.times == 1:
+        if question is not None and question.times == 1:
             self.pace.answer(self._line.now - question.sent)
-        return True
+        return question is not None
 
     def hear(self) -> Talk[Envelope | None]:
         """Return what is heard next; None once time has passed, and late ones were put again."""
         yield min([self.until, *map(self._due, self.asked.values())])
         if self._line.heard is None:
-            self._repeat()
+            late = {k: each for k, each in self.asked.items() if self._due(each) <= self._line.now}
+            if any(each.times == 1 for each in late.values()):
+                self.pace.repeat()
+            for key, question in late.items():
+                self.put(key, *question.again)
         return self._line.heard
 
-    def _repeat(self) -> None:
-        late = [key for key, each in self.asked.items() if self._due(each) <= self._line.now]
-        if any(self.asked[key].times == 1 for key in late):
-            self.pace.repeat()
-        for key in late:
-            self.put(key, *self.asked[key].again)
-
-    def _due(self, question: Question) -> float:
+    def _due(self, question: _Question) -> float:
         """Return when `question` is put again: each time after twice as long."""
         wait = self.pace.wait * 2.0 ** min(question.times - 1, 8)  # beyond the longest
         return question.sent + min(wait, max(_LONGEST, self.pace.wait))
@@ -143,8 +135,7 @@ def ask(
     questions.put(what, question)
     while not questions.over:
         heard = yield from questions.hear()
-        found = None if heard is None else answer(heard)
-        if found is not None:
+        if heard is not None and (found := answer(heard)) is not None:
             return found
     return None
 

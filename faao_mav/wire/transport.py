@@ -19,24 +19,15 @@ FORMS = (
     "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
     "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
 )
-_KINDS = {"udp": "udpin"} | {each: each for each in ("udpin", "udpout", "tcp", "tcpin")}
-"""Kinds of connections, by what they are called."""
+_KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
+_CONNECT_TIMEOUT, _WRITE_TIMEOUT = 5.0, 5.0
+"""Seconds to wait for a TCP connection, and in which a serial port has to take a packet: chosen,
+above the 4.3 s in which a line of 9600 baud empties the 4096 bytes that Linux keeps for it."""
 
-_CONNECT_TIMEOUT = 5.0
-"""Seconds to wait for a TCP connection: chosen."""
-
-_FORGET = 30.0
-"""Seconds after which a silent UDP sender is not answered any more: chosen, 30 lost heartbeats."""
-
-_MOST_PEERS = 64
-"""UDP senders that are remembered, and TCP peers, at most; chosen: each is sent every packet."""
-
-_BURST = 256
-"""Datagrams that are read at once, at most; chosen: who sends without end stops nothing else."""
-
-_WRITE_TIMEOUT = 5.0
-"""Seconds in which a serial port has to take a packet: chosen, above the 4.3 s in which a line of
-9600 baud empties the 4096 bytes that Linux keeps for it."""
+_FORGET, _MOST_PEERS, _BURST = 30.0, 64, 256
+"""Seconds after which a silent UDP sender is not answered any more, 30 lost heartbeats; the most
+UDP senders that are remembered, and TCP peers: each is sent every packet; the most datagrams that
+are read at once: who sends without end stops nothing else. Chosen."""
 
 _REASONS = {
     errno.EADDRINUSE: "the port is in use; stop who listens there, or take another port",
@@ -88,7 +79,7 @@ def parse_connection(text: str) -> Endpoint:
             raise InputError(f"connection {text!r}: expected {kind}:HOST:PORT")
         if not 0 < int(port) < 65_536:
             raise InputError(f"connection {text!r}: port {port}; expected 1 to 65535")
-        return Endpoint(_KINDS[kind], host, int(port))
+        return Endpoint("udpin" if kind == "udp" else kind, host, int(port))
     device, comma, baud = text.partition(",")
     if not device or (colon and "/" not in kind) or not (comma or "/" in device):
         raise InputError(f"connection {text!r}: expected {FORMS}")
@@ -206,14 +197,13 @@ class _Tcp:
                 with contextlib.suppress(OSError):
                     self._welcome(*ready.accept())
                 continue
+            origin, framer = self._peers[ready]
             try:
-                data, error = ready.recv(_MAX_DATAGRAM), None
-            except OSError as broken:
-                data, error = b"", broken
-            if data:
-                origin, framer = self._peers[ready]
+                data = ready.recv(_MAX_DATAGRAM)
+                if not data:
+                    raise ConnectionError
                 found += [(packet, origin) for packet in framer.feed(data)]
-            else:
+            except OSError as error:
                 self._drop(ready, error)
         return found
 
@@ -230,7 +220,7 @@ class _Tcp:
             each.close()
 
     def _sockets(self) -> list[socket.socket]:
-        return [*self._peers] if self._listener is None else [self._listener, *self._peers]
+        return [*([self._listener] if self._listener else ()), *self._peers]
 
     def _welcome(self, peer: socket.socket, address: _Place) -> None:
         """Take one more peer, if there is room; it is dropped when it does not read."""
@@ -240,16 +230,14 @@ class _Tcp:
         peer.setblocking(False)
         self._peers[peer] = (_origin(address), Framer())
 
-    def _drop(self, peer: socket.socket, error: OSError | None) -> None:
+    def _drop(self, peer: socket.socket, error: OSError) -> None:
         """Forget one of several peers; raise `LinkError` for the only one there can be."""
-        if self._listener is not None:
-            del self._peers[peer]
-            peer.close()
-            return
-        why = "the other side closed the connection"
-        if error is not None and not isinstance(error, ConnectionError):
-            why = error.strerror or str(error)
-        raise LinkError(f"{self._name}: {why}") from None
+        del self._peers[peer]
+        peer.close()
+        if self._listener is None:
+            closed = isinstance(error, ConnectionError)
+            why = "the other side closed the connection" if closed else error.strerror or str(error)
+            raise LinkError(f"{self._name}: {why}") from None
 
 
 class _Serial:

@@ -15,12 +15,12 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire.client import UploadReport
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.framing import Framer
 from faao_mav.wire.jobs import (
     Lists,
+    UploadReport,
     download_lists,
     explain,
     upload_parts,
@@ -48,7 +48,6 @@ from faao_mav.wire.protocol import (
 from faao_mav.wire.questions import ask_alive, ask_for
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer import Peer
-from faao_mav.wire.upload_text import upload_text
 from faao_mav.wire.wire_items import mission_of, wire_items
 
 _VEHICLE = Address(1, 1)
@@ -160,7 +159,7 @@ def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
     elif isinstance(outcome, tuple):
         problems = tuple(explain(each, peer, _MISSION) for each in outcome if not each.verified)
         report = UploadReport(found, outcome, 1.0, problems)
-        lines = upload_text(report).split("\n")
+        lines = str(report).split("\n")
         assert all(line.isprintable() for line in lines), lines
         assert report.verified == any(line.startswith("verified") for line in lines), lines
         json.dumps(as_dict(report), allow_nan=False)
