@@ -9,8 +9,7 @@ from conftest import free_port
 
 from faao_mav.mission.item import Home
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.sim.faults import Faults
-from faao_mav.sim.serve import serve
+from faao_mav.sim.faults import Faults, serve
 from faao_mav.wire.transport import Transport, open_transport
 
 HOME = Home(-35.363262, 149.165237, 584.0)

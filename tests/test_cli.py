@@ -340,7 +340,7 @@ def test_the_mock_flies_by_its_parameters(
         transport.close()
         made.append(mock)
 
-    monkeypatch.setattr("faao_mav.sim.serve.serve", serve)
+    monkeypatch.setattr("faao_mav.sim.faults.serve", serve)
     slow = tmp_path / "slow.param"
     slow.write_text("WPNAV_ACCEL,50\nWPNAV_SPEED,300\n")
     for file in (out.with_suffix(".param"), slow):

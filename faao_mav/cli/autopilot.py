@@ -75,8 +75,7 @@ def autopilot(
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.mission.item import Home
     from faao_mav.sim import MockAutopilot, behaviour_of
-    from faao_mav.sim.faults import Faults
-    from faao_mav.sim.serve import serve
+    from faao_mav.sim.faults import Faults, serve
     from faao_mav.wire.protocol import Address
     from faao_mav.wire.signing import read_signing
     from faao_mav.wire.transport import open_transport

@@ -13,9 +13,9 @@ from faao_mav.autopilot import VehicleType, vehicle_types
 from faao_mav.autopilot.parameter import Parameter
 from faao_mav.errors import InputError
 from faao_mav.wire.machine import AT_ONCE, Talk
-from faao_mav.wire.messages import Envelope, ParamRequestRead, ParamSet, ParamValue
+from faao_mav.wire.messages import ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.protocol import listed
-from faao_mav.wire.questions import SILENCE, Pace, Questions, ask
+from faao_mav.wire.questions import Pace, Questions
 from faao_mav.wire.transfer import Peer
 
 Names: TypeAlias = tuple[str, ...]
@@ -70,10 +70,16 @@ def same_value(one: float, other: float) -> bool:
     return struct.pack("<f", one) == struct.pack("<f", other)
 
 
-def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
-    """Read `parameters` of the vehicle of `peer`, each by all of its names."""
+def read_parameters(
+    peer: Peer, parameters: Iterable[Names], setting: Mapping[str, ParamSet] | None = None
+) -> Talk[Reading]:
+    """Read `parameters` of the vehicle of `peer`, each by all of its names.
+
+    Those in `setting` are set, and missing unless the vehicle answers with that very value. It is
+    told until it does: setting one twice does no harm.
+    """
     line = yield AT_ONCE
-    left = list(dict.fromkeys(parameters))
+    left, setting = list(dict.fromkeys(parameters)), setting or {}
     questions, total = Questions[Names](line, Pace(), _SILENCE), len(left)
     names_of = {name: names for names in left for name in names}
     values, kinds = dict[str, float](), dict[str, int]()
@@ -83,31 +89,21 @@ def read_parameters(peer: Peer, parameters: Iterable[Names]) -> Talk[Reading]:
         while left and room < _AT_ONCE:
             names = left.pop(0)
             room += len(names)
-            questions.put(names, *(ParamRequestRead(peer.address, name, -1) for name in names))
-        line.progress = "reading parameters", total - len(left) - len(questions.asked), total
+            reads = {name: ParamRequestRead(peer.address, name, -1) for name in names}
+            questions.put(names, *(setting.get(name, reads[name]) for name in names))
+        done = total - len(left) - len(questions.asked)
+        line.progress = f"{'setting' if setting else 'reading'} parameters", done, total
         heard = yield from questions.hear()
-        told = heard and heard.said(peer.address, ParamValue)
-        if told and questions.answer(names_of.get(told.param_id, ())):
-            values[told.param_id] = value_in(told, peer.vehicle)
-            kinds[told.param_id] = told.param_type
+        told = None if heard is None else heard.said(peer.address, ParamValue)
+        if told is None:
+            continue
+        name, value = told.param_id, value_in(told, peer.vehicle)
+        if name in setting and not same_value(value, value_in(setting[name], peer.vehicle)):
+            continue
+        if questions.answer(names_of.get(name, ())):
+            values[name], kinds[name] = value, told.param_type
             questions.further()
     return Reading(values, (*questions.asked, *left), kinds)
-
-
-def _set_parameter(peer: Peer, name: str, value: float, kind: int) -> Talk[bool]:
-    """Set a parameter; tell whether it is set.
-
-    The vehicle is told the value until it answers with it: setting it twice does no harm.
-    """
-
-    def answer(heard: Envelope) -> bool | None:
-        told = heard.said(peer.address, ParamValue)
-        of_it = told and told.param_id == name and same_value(value_in(told, peer.vehicle), value)
-        return of_it or None
-
-    question = ParamSet(peer.address, name, carried(value, kind, peer.vehicle), kind)
-    told = yield from ask(f"setting {name}", question, answer, SILENCE)
-    return told is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,8 +161,7 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
     """Give the vehicle of `peer` the parameters of its table that `wanted` names, and read them.
 
     Of the names of one parameter it sets the one that the vehicle has. Nothing is set if the
-    vehicle does not know one; it stops at the first that the vehicle does not take. Return the
-    changes, and in words what went wrong, "" for nothing.
+    vehicle does not know one. Return the changes, and in words what went wrong, "" for nothing.
     """
     table = () if peer.vehicle is None else peer.vehicle.parameters.values()
     groups = {tuple(each.names): each for each in table if each.name_in(wanted) is not None}
@@ -177,8 +172,8 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
         before = yield from read_parameters(peer, groups)
         unknown = [*before.missing]
     if unknown:
-        names = listed([" or ".join(each) for each in unknown])
-        return (), f"parameters: the vehicle has no {names}: nothing was set or uploaded"
+        told = listed([" or ".join(each) for each in unknown])
+        return (), f"parameters: the vehicle has no {told}: nothing was set or uploaded"
     asked = {
         name: number
         for names, parameter in groups.items()
@@ -187,10 +182,13 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
         if (number := number_in(parameter, name, wanted)) is not None
         if not same_value(number, before.values[name])
     }
+    setting = dict[str, ParamSet]()
     for name, number in asked.items():
-        if not (yield from _set_parameter(peer, name, number, before.kinds[name])):
-            break
-    after = yield from read_parameters(peer, [(name,) for name in asked])
+        kind = before.kinds[name]
+        setting[name] = ParamSet(peer.address, name, carried(number, kind, peer.vehicle), kind)
+    names = [(name,) for name in asked]
+    yield from read_parameters(peer, names, setting)
+    after = yield from read_parameters(peer, names)
     changes = tuple(
         Change(name, before.values[name], number, after.values.get(name))
         for name, number in asked.items()

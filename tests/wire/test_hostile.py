@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -129,6 +130,14 @@ class _Slow(MockAutopilot):
         return super()._receive(envelope, now)
 
 
+def command(number: signal.Signals, arguments: list[str], **pipes: int) -> "subprocess.Popen[str]":
+    """Run the program as a process that hears a signal, which `nohup` has it ignore."""
+    heard = f"import signal; signal.signal({int(number)}, signal.SIG_DFL); "
+    code = heard + "from faao_mav.cli.main import run; run()"
+    nowhere = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.Popen([sys.executable, "-c", code, *arguments], text=True, **nowhere | pipes)  # type: ignore[call-overload,no-any-return]
+
+
 @pytest.mark.parametrize(
     ("kind", "number", "holds"),
     [
@@ -154,14 +163,9 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
     mock = Ended(behaviour_of(kind), home=HOME, beat=0.1)
     port = free_port()
     with running(mock, f"udpin:127.0.0.1:{port}"):
-        heard = f"import signal; signal.signal({int(number)}, signal.SIG_DFL); "  # nohup ignores it
-        command = heard + "from faao_mav.cli.main import run; run()"
         to = f"udpout:127.0.0.1:{port}"
-        client = subprocess.Popen(
-            [sys.executable, "-c", command, "upload", path, "--to", to, "--system", "1"],
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        arguments = ["upload", str(path), "--to", to, "--system", "1"]
+        client = command(number, arguments, stderr=subprocess.PIPE)
         _, errors = client.communicate(timeout=PATIENCE)
         for _ in range(100):  # the mock hears of it a moment later
             if not cancelled:
@@ -172,43 +176,38 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
     assert [ack.type for ack in cancelled] == [MavResult.OPERATION_CANCELLED]
 
 
-@pytest.mark.parametrize("gone", ["terminal", "reader"])
-def test_a_mission_goes_on_when_nobody_can_be_told_any_more(gone: str, tmp_path: Path) -> None:
+class _Told(MockAutopilot):
+    """It notes the orders that it is given."""
+
+    def _receive(self, envelope: Envelope, now: float) -> Any:
+        message = envelope.message
+        if isinstance(message, CommandLong) and message.command < MavCommand.SET_INTERVAL:
+            self.orders = [*getattr(self, "orders", []), message.command]
+        return super()._receive(envelope, now)
+
+
+def test_a_mission_goes_on_when_nobody_can_be_told_any_more(tmp_path: Path) -> None:
     """A lost SSH session: a hang-up, and output that nobody reads."""
-    path, orders = tmp_path / "m.waypoints", list[int]()
+    path, flights = tmp_path / "m.waypoints", list[tuple[_Told, subprocess.Popen[str]]]()
     path.write_text(write_wpl(a_mission(9)))
-
-    class Told(MockAutopilot):
-        def _receive(self, envelope: Envelope, now: float) -> Any:
-            message = envelope.message
-            if isinstance(message, CommandLong) and message.command < MavCommand.SET_INTERVAL:
-                orders.append(message.command)
-            return super()._receive(envelope, now)
-
-    mock = Told(behaviour_of("ardupilot"), home=HOME, beat=0.1)
-    port = free_port()
-    to = f"udpout:127.0.0.1:{port}"
-    heard = "import signal; signal.signal(signal.SIGHUP, signal.SIG_DFL); "  # nohup ignores it
-    command = heard + "from faao_mav.cli.main import run; run()"
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        assert upload(a_mission(9), to, system=1).verified
-        client = subprocess.Popen(
-            [sys.executable, "-c", command, "fly", path, "--to", to, "--system", "1", "--arm"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        assert client.stdout is not None
-        for line in client.stdout:
-            if "the mission is under way" in line:
-                break
-        if gone == "terminal":
-            client.send_signal(signal.SIGHUP)
-            assert "the terminal has gone" in client.stdout.read()
-        client.stdout.close()
-        assert client.wait(timeout=PATIENCE) != 0
-        assert (mock.armed, mock.mode) == (True, 3)
-    assert orders == [MavCommand.ARM, MavCommand.START]
+    with ExitStack() as stack:
+        for _ in range(2):
+            mock, port = _Told(behaviour_of("ardupilot"), home=HOME, beat=0.1), free_port()
+            stack.enter_context(running(mock, f"udpin:127.0.0.1:{port}"))
+            to = f"udpout:127.0.0.1:{port}"
+            assert upload(a_mission(9), to, system=1).verified
+            arguments = ["fly", str(path), "--to", to, "--system", "1", "--arm"]
+            flights.append((mock, command(signal.SIGHUP, arguments, stdout=subprocess.PIPE)))
+        for mock, client in flights:
+            assert client.stdout is not None
+            assert any("the mission is under way" in line for line in client.stdout)
+            if client is flights[0][1]:
+                client.send_signal(signal.SIGHUP)
+                assert "the terminal has gone" in client.stdout.read()
+            client.stdout.close()
+            assert client.wait(timeout=PATIENCE) != 0
+            assert (mock.armed, mock.mode) == (True, 3)
+            assert mock.orders == [MavCommand.ARM, MavCommand.START]
 
 
 def test_a_link_that_breaks_in_an_upload_says_what_is_left(

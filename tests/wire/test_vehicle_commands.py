@@ -116,7 +116,7 @@ def test_the_mock_autopilot_as_a_command(
     mission_file: Path, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its diary tells what it was given; it ends by the keyboard."""
-    from faao_mav.sim import serve as serving
+    from faao_mav.sim import faults as serving
 
     ended = threading.Event()
     serve = serving.serve
