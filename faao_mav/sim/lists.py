@@ -1,7 +1,6 @@
 """How a mock autopilot takes, refuses, stores and gives lists of items."""
 
 import math
-import struct
 import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -15,9 +14,6 @@ from faao_mav.wire import messages
 from faao_mav.wire.messages import ListMessage, Message, WireItem
 from faao_mav.wire.protocol import ALL_TYPES, Address, MavResult, MavSeverity, MissionType
 from faao_mav.wire.wire_items import home_items, mission_item, mission_of, wire_item
-
-_FIELDS = range(MavResult.INVALID_PARAM1, MavResult.INVALID_PARAM7 + 1)
-"""What is wrong if param1 to param4, x, y or z is."""
 
 
 @dataclass(slots=True)
@@ -85,11 +81,8 @@ class StoredLists:
 
     def number(self, part: MissionType) -> int:
         """Return a number that tells this list from others, a checksum; 0: it has no numbers."""
-        packed = b"".join(
-            struct.pack("<HB5f2i", item.command, item.frame, *item.params, item.z, item.x, item.y)
-            for item in self._items[part]
-        )
-        return zlib.crc32(packed) if self._behaviour.numbers_lists else 0
+        checksum = zlib.crc32(repr(self._items[part]).encode())
+        return checksum if self._behaviour.numbers_lists else 0
 
     @property
     def deadline(self) -> float:
@@ -133,11 +126,9 @@ class StoredLists:
                 return self._on_request(sender, message, under_way)
             case messages.MissionAck(type=result) if under_way is not None and self._alone:
                 return self._on_ack(part, result, under_way) if sender == under_way.partner else []
-            case messages.MissionClearAll() if self._alone and under_way is not None:
-                return []
-            case messages.MissionClearAll() if not self._alone and part == 0 and self._flying():
-                return _ack(sender, given, MavResult.ERROR)
-            case messages.MissionClearAll():
+            case messages.MissionClearAll() if not (under_way and self._alone):
+                if part is MissionType.MISSION and self._flying() and not self._alone:
+                    return _ack(sender, given, MavResult.ERROR)
                 return self._clear(sender, given, parts)
         return []
 
@@ -194,9 +185,12 @@ class StoredLists:
             self.replace(part, upload.items + self.items(part)[seq + 1 :])
         if upload.passed < upload.count:
             return self._ask(upload)
-        if part is MissionType.FENCE and not (self._alone or self._is_fence(upload.items)):
-            text = _warning("Fence validation failed")
-            return [text, *self._end(upload, MavResult.ERROR)]
+        if part is MissionType.FENCE and not self._alone:
+            try:
+                mission_of({part: upload.items}, self._vehicle)
+            except InputError:
+                ended = self._end(upload, MavResult.ERROR)
+                return [_warning("Fence validation failed"), *ended]
         self.replace(part, upload.items)
         return self._end(upload, MavResult.ACCEPTED)
 
@@ -262,13 +256,6 @@ class StoredLists:
     def _in_place(self, part: MissionType) -> bool:
         return not self._dialect.atomic and part is not MissionType.FENCE
 
-    def _is_fence(self, items: tuple[WireItem, ...]) -> bool:
-        try:
-            mission_of({MissionType.FENCE: items}, self._vehicle)
-        except InputError:
-            return False
-        return True
-
     def _check_item(self, part: MissionType, seq: int, item: WireItem) -> MavResult:
         """Return what it answers to `item`, number `seq` of that list."""
         if (refusal := self._behaviour.refusals.get((part, seq))) is not None:
@@ -290,11 +277,11 @@ class StoredLists:
         refusal = self._dialect.refusal
         if item.frame != Frame.MISSION and refusal(MissionItem(16, item.frame)) is not None:
             return MavResult.UNSUPPORTED_FRAME
-        values = (*item.params, item.x, item.y, item.z)
-        for tried in range(len(values) + 1):
-            one, two, three, four, x, y, z = (*values[:tried], *[0.0] * (len(values) - tried))
+        for tried in range(8):
+            one, two, three, four, x, y, z = (*item.numbers[:tried], *[0.0] * (7 - tried))
             if refusal(replace(item, params=(one, two, three, four), x=x, y=y, z=z)) is not None:
-                return MavResult.UNSUPPORTED if tried == 0 else MavResult(_FIELDS[tried - 1])
+                wrong = MavResult.INVALID_PARAM1 + tried - 1
+                return MavResult(wrong) if tried else MavResult.UNSUPPORTED
         return MavResult.ACCEPTED
 
 

@@ -42,15 +42,14 @@ class ParameterServer:
                 names = [name] if name in self.values else []
             case ParamSet(param_id=name):
                 names = [name] if self._takes(message) else []
-        return [self._value(name) for name in names]
+        return [self._told(name) for name in names]
 
     def _takes(self, message: ParamSet) -> bool:
         """Set a parameter; tell whether it is one, whatever became of its value."""
-        name, kind = message.param_id, message.param_type
+        name, value = message.param_id, value_in(message, self._vehicle)
         strict = self._vehicle.family.whole_as_bits
-        if name not in self.values or (strict and kind != self._kind(name)):
+        if name not in self.values or (strict and message.param_type != self._kind(name)):
             return False
-        value = value_in(message, self._vehicle)
         if math.isfinite(value):
             self.values[name] = type(self.values[name])(value)
         return True
@@ -58,7 +57,7 @@ class ParameterServer:
     def _kind(self, name: str) -> int:
         return _INT32 if isinstance(self.values[name], int) else _REAL32
 
-    def _value(self, name: str) -> ParamValue:
+    def _told(self, name: str) -> ParamValue:
         index, kind = list(self.values).index(name), self._kind(name)
         number = carried(float(self.values[name]), kind, self._vehicle)
         return ParamValue(name, number, kind, len(self.values), index)

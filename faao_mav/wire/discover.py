@@ -23,24 +23,16 @@ from faao_mav.wire.protocol import (
 )
 from faao_mav.wire.transport import Origin
 
-_BOOT = 60.0
-"""Seconds that a vehicle may boot; chosen."""
-
 _MAIN = 1
 """MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
-_SETTLE = 1.2
-"""Seconds after the first vehicle in which others are heard: chosen, above a heartbeat's period."""
+_BOOT, _SETTLE, _LOOK_AGAIN = 60.0, 1.2, 0.2
+"""Seconds that a vehicle may boot; after the first vehicle in which others are heard; and between
+two looks at whether all have booted. Chosen: a heartbeat's period is a second."""
 
-_LOOK_AGAIN = 0.2
-"""Seconds between two looks at whether all vehicles have booted: chosen, a fifth of a heartbeat's
-period."""
-
-_GREET = 1.0
-"""Seconds between two questions to whoever is there: chosen, a heartbeat's period."""
-
-_KNOCK = 2.0
-"""Seconds of silence before a heartbeat is sent into it: chosen, two heartbeats of a vehicle."""
+_GREET, _KNOCK = 1.0, 2.0
+"""Seconds between two questions to whoever is there, and of silence before a heartbeat is sent into
+it. Chosen: one and two heartbeats of a vehicle."""
 
 _NOTHING = "is it switched on and connected there, and no other program in between?"
 

@@ -5,14 +5,11 @@ Source: MAVLink developer guide, "Serialization".
 
 from faao_mav.wire.protocol import Address
 
-_MAVLINK_1, _MAVLINK_2 = 0xFE, 0xFD
-"""First bytes of packets."""
+_MAVLINK_1, _MAVLINK_2, _SIGNATURE = 0xFE, 0xFD, 13
+"""First bytes of packets, and the bytes of a MAVLink 2 packet's signature."""
 
 _AROUND = {_MAVLINK_1: 8, _MAVLINK_2: 12}
 """Bytes of a packet's header and checksum, by its first byte."""
-
-_SIGNATURE = 13
-"""Bytes of the signature of a MAVLink 2 packet."""
 
 _SIGNED = 0x01
 """The flag, in the third byte of a MAVLink 2 packet, that it has a signature. There are no others

@@ -13,14 +13,17 @@ from faao_mav.wire.wire_items import coordinate_scale, home_items, mission_item
 
 DifferenceKind: TypeAlias = Literal["dropped", "wrong"]
 
-_CENTIMETRE = 0.0101
-"""Altitudes that differ by less are equal, m: ArduPilot stores whole centimetres."""
-
-_FLOAT32 = 2e-7
-"""Relative difference of two numbers that single precision does not tell apart."""
+_CENTIMETRE, _FLOAT32 = 0.0101, 2e-7
+"""Altitudes that differ by less are equal, m: ArduPilot stores whole centimetres; and the relative
+difference of two numbers that single precision does not tell apart."""
 
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
 """Frames with the same meaning: those ending in _INT, and what they are called without."""
+
+_FIELDS = (
+    *("command", "frame", "autocontinue"),
+    *("param1", "param2", "param3", "param4", "x", "y", "z"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,10 +104,8 @@ def _compare(
 
 def _values(item: MissionItem) -> dict[str, float]:
     """Return the numbers of an item by name."""
-    params = {f"param{number}": value for number, value in enumerate(item.params, start=1)}
-    place = {"x": item.x, "y": item.y, "z": item.z}
-    flags = {"command": item.command, "frame": item.frame, "autocontinue": item.autocontinue}
-    return {**flags, **params, **place}
+    values = (item.command, item.frame, item.autocontinue, *item.numbers)
+    return dict(zip(_FIELDS, values, strict=True))
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:

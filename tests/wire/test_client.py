@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from conftest import free_port
 from pymavlink import mavutil
-from served import running
+from served import running, vehicle
 from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
@@ -69,17 +69,16 @@ def test_other_ways_to_connect(listen: str, to: str) -> None:
         assert upload(a_mission(5), f"{to}:127.0.0.1:{port}", system=1).verified
 
 
-def test_no_space_says_the_limit_and_the_count(port: int) -> None:
-    with running(mock_of("ardupilot"), f"udpin:127.0.0.1:{port}"):
-        report = upload(a_mission(700), f"udpout:127.0.0.1:{port}", system=1)
+def test_no_space_says_the_limit_and_the_count() -> None:
+    with vehicle("ardupilot") as (connection, _):
+        report = upload(a_mission(700), connection, system=1)
     (problem,) = report.problems
     assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
     assert "The vehicle says: Only 655 items are supported" in problem
 
 
-def test_the_mission_of_an_armed_vehicle_is_left_alone(port: int) -> None:
-    connection = f"udpout:127.0.0.1:{port}"
-    with running(mock_of("px4"), f"udpin:127.0.0.1:{port}") as mock:
+def test_the_mission_of_an_armed_vehicle_is_left_alone() -> None:
+    with vehicle("px4") as (connection, mock):
         mock.flight.arm(0.0)
         with pytest.raises(LinkError, match="armed vehicle is not replaced; disarm it"):
             upload(a_mission(5), connection, system=1)
@@ -119,10 +118,10 @@ def test_no_vehicle(port: int) -> None:
     with pytest.raises(LinkError, match=r"no heartbeat of an autopilot within 0\.3 s"):
         download(f"udpout:127.0.0.1:{port}", wait=0.3)
     with (
-        running(mock_of("px4"), f"udpin:127.0.0.1:{port}"),
+        vehicle("px4") as (connection, _),
         pytest.raises(LinkError, match="the autopilot of system 9"),
     ):
-        download(f"udpout:127.0.0.1:{port}", system=9, wait=0.3)
+        download(connection, system=9, wait=0.3)
     with pytest.raises(LinkError, match="an autopilot with component number 7 within"):
         download(f"udpout:127.0.0.1:{port}", component=7, wait=0.3)
 
@@ -138,15 +137,12 @@ def test_a_log_that_cannot_be_written_is_an_error_before_anything_is_sent(
     assert path.read_text() == "QGC WPL 110\n"
 
 
-def test_interrupted_from_the_keyboard(port: int) -> None:
-    mock = mock_of("px4")
-    connection = f"udpout:127.0.0.1:{port}"
-
+def test_interrupted_from_the_keyboard() -> None:
     def observe(what: str, done: int, total: int) -> None:
         if what.startswith("uploading") and done == 3:
             raise KeyboardInterrupt
 
-    with running(mock, f"udpin:127.0.0.1:{port}"):
+    with vehicle("px4") as (connection, _):
         with pytest.raises(LinkError, match="interrupted while uploading mission at item 3 of 9"):
             upload(a_mission(9), connection, system=1, observe=observe)
         # The vehicle is free again at once, and nothing of it holds the port.

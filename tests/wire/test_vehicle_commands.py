@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import typer
 from conftest import free_port
-from served import running
+from served import running, vehicle
 from stations import FENCE, HOME, RALLY, a_mission, hurry, vehicle_of
 from typer.testing import CliRunner, Result
 
@@ -19,8 +19,9 @@ from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.formats import read_mission, read_mission_file, write_wpl
-from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim import MockAutopilot, behaviour_of, faults
 from faao_mav.wire import download as get
+from faao_mav.wire import upload as put
 from faao_mav.wire.messages import Envelope, MissionRequestList
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.transport import Transport
@@ -43,25 +44,15 @@ def mission_file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.fixture
-def port() -> int:
-    return free_port()
-
-
-def a_mock(kind: MockKind | Behaviour = "ardupilot", **options: Any) -> MockAutopilot:
-    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(behaviour, home=HOME, beat=0.1, **options)
-
-
-def test_upload_and_download(tmp_path: Path, port: int) -> None:
+def test_upload_and_download(tmp_path: Path) -> None:
     """What ArduPilot does not keep is told once for each field."""
-    path, out, to = tmp_path / "m.waypoints", tmp_path / "back.plan", f"udpout:127.0.0.1:{port}"
+    path, out = tmp_path / "m.waypoints", tmp_path / "back.plan"
     items = tuple(
         MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36 + k * 1e-4, 149.16, 20.0)
         for k in range(4)
     )
     path.write_text(write_wpl(Mission(items, HOME)))
-    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
+    with vehicle() as (to, _):
         result = run("upload", path, "--to", to, "--system", 1)
         assert (result.exit_code, result.stderr) == (0, ""), result.output
         *told, kept, verified = result.stdout.splitlines()
@@ -83,10 +74,9 @@ def test_upload_and_download(tmp_path: Path, port: int) -> None:
         assert (kept_item.x, kept_item.y, kept_item.z) == pytest.approx((item.x, item.y, item.z))
 
 
-def test_json_is_one_object(mission_file: Path, port: int) -> None:
-    to, system = f"udpout:127.0.0.1:{port}", ("--system", 1)
-    with running(a_mock("px4"), f"udpin:127.0.0.1:{port}"):
-        result = run("upload", mission_file, "--to", to, "--json", *system)
+def test_json_is_one_object(mission_file: Path) -> None:
+    with vehicle("px4") as (to, _):
+        result = run("upload", mission_file, "--to", to, "--json", "--system", 1)
     assert (result.exit_code, result.stdout.count("\n")) == (0, 1)
     data = json.loads(result.stdout)
     assert (data["verified"], data["vehicle"]["autopilot"], data["problems"]) == (True, "px4", [])
@@ -95,16 +85,15 @@ def test_json_is_one_object(mission_file: Path, port: int) -> None:
     assert mission["opaque_id"] > 0
     item = MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36, 149.16, 20.0)
     mission_file.write_text(write_wpl(Mission((item,), HOME)))
-    with running(a_mock(), f"udpin:127.0.0.1:{port}"):
-        result = run("upload", mission_file, "--to", to, "--json", *system)
+    with vehicle() as (to, _):
+        result = run("upload", mission_file, "--to", to, "--json", "--system", 1)
     lost = {"item": 0, "field": "param1", "sent": 2.5, "found": 2.0, "kind": "dropped"}
     assert json.loads(result.stdout)["lists"][0]["differences"] == [lost]
 
 
-def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
-    mock = a_mock(behaviour_of("ardupilot", refusals={(0, 3): MavResult.INVALID_PARAM7}))
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        result = run("upload", mission_file, "--to", f"udpout:127.0.0.1:{port}", "--system", 1)
+def test_a_refused_upload_is_status_1(mission_file: Path) -> None:
+    with vehicle(refusals={(0, 3): MavResult.INVALID_PARAM7}) as (to, _):
+        result = run("upload", mission_file, "--to", to, "--system", 1)
     assert result.exit_code == 1
     assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
     assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
@@ -112,20 +101,15 @@ def test_a_refused_upload_is_status_1(mission_file: Path, port: int) -> None:
     assert "verified     " not in result.stdout
 
 
-def test_the_mock_autopilot_as_a_command(
-    mission_file: Path, port: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_mock_autopilot_as_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its diary tells what it was given; it ends by the keyboard."""
-    from faao_mav.sim import faults as serving
-
-    ended = threading.Event()
-    serve = serving.serve
+    ended, port, serve = threading.Event(), free_port(), faults.serve
 
     def until_ended(mock: MockAutopilot, transport: Transport, **options: Any) -> None:
         serve(mock, transport, **options, stop=ended.is_set)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(serving, "serve", until_ended)
+    monkeypatch.setattr(faults, "serve", until_ended)
     results = []
 
     def serve_it() -> None:
@@ -137,8 +121,6 @@ def test_the_mock_autopilot_as_a_command(
     thread.start()
     try:
         time.sleep(0.3)
-        from faao_mav.wire import upload as put
-
         assert put(a_mission(6, fence=FENCE), f"udpout:127.0.0.1:{port}", system=1).verified
     finally:
         ended.set()
@@ -170,8 +152,9 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("hasty")
 @pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
 def test_what_can_be_read_is_written_and_what_cannot_is_told(
-    part: MissionType, port: int, tmp_path: Path
+    part: MissionType, tmp_path: Path
 ) -> None:
+    port = free_port()
     mock = Reticent(behaviour_of("px4"), home=HOME, beat=0.1)
     mock.parts = (part,)
     held = a_mission(5, fence=FENCE, rally=RALLY)
@@ -201,7 +184,8 @@ def test_what_can_be_read_is_written_and_what_cannot_is_told(
 
 
 @pytest.mark.usefixtures("hasty")
-def test_a_download_without_a_mission_writes_nothing(port: int, tmp_path: Path) -> None:
+def test_a_download_without_a_mission_writes_nothing(tmp_path: Path) -> None:
+    port = free_port()
     mock, out = Reticent(behaviour_of("px4"), home=HOME, beat=0.1), tmp_path / "m.plan"
     to = f"udpout:127.0.0.1:{port}"
     with running(mock, f"udpin:127.0.0.1:{port}"):
