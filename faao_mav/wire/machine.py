@@ -3,7 +3,6 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, field
 from typing import Generic, TypeAlias, TypeVar
 
 from faao_mav.wire.messages import Envelope, Message
@@ -67,21 +66,20 @@ class Machine(ABC, Generic[T]):
         """Do what is due now."""
 
 
-@dataclass(slots=True)
 class Line:
     """What a talk knows of its link: the time, s, and what was `heard`, None when time has passed.
 
     It tells its `progress`, and says messages, which are sent once it waits.
     """
 
-    now: float = 0.0
+    now = 0.0
     heard: Envelope | None = None
     progress: Progress = ("starting", 0, 0)
-    said: list[Message] = field(default_factory=list)
+    _said: list[Message]
 
     def say(self, *messages: Message) -> None:
         """Send `messages`."""
-        self.said += messages
+        self._said += messages
 
 
 Talk: TypeAlias = Generator[float, Line, T]
@@ -94,8 +92,8 @@ AT_ONCE = -math.inf
 """What a talk yields that only wants its line."""
 
 
-class Script(Machine[T]):
-    """A machine that runs a talk, whose outcome is not None.
+class Script(Line, Machine[T]):
+    """A machine that runs a talk, whose line it is, and whose outcome is not None.
 
     >>> def knock():
     ...     line = yield AT_ONCE
@@ -109,12 +107,7 @@ class Script(Machine[T]):
 
     def __init__(self, talk: Talk[T]) -> None:
         super().__init__()
-        self._talk, self._line = talk, Line()
-
-    @property
-    def progress(self) -> Progress:
-        """What the talk tells."""
-        return self._line.progress
+        self._talk = talk
 
     def start(self, now: float) -> Sequence[Message]:
         """Begin the talk."""
@@ -129,20 +122,16 @@ class Script(Machine[T]):
 
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Close the talk: there is no outcome."""
-        self._due = math.inf
+        self._said, self._due = [], math.inf
         self._talk.close()
-        return self._sent()
+        return self._said
 
     def _carry_on(self, heard: Envelope | None, now: float) -> Sequence[Message]:
-        self._line.now, self._due = now, AT_ONCE
+        self.now, self._said, self._due = now, [], AT_ONCE
         try:
             while self._due == AT_ONCE:
-                self._line.heard, heard = heard, None
-                self._due = self._talk.send(self._line)
+                self.heard, heard = heard, None
+                self._due = self._talk.send(self)
         except StopIteration as end:
             self.outcome = end.value
-        return self._sent()
-
-    def _sent(self) -> list[Message]:
-        said, self._line.said = self._line.said, []
-        return said
+        return self._said

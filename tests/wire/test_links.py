@@ -10,13 +10,13 @@ KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 
 
 @KINDS
-def test_600_items_over_a_quick_link(kind: MockKind) -> None:
-    for loss, seconds, messages in ((0.0, 5, 1), (0.05, 10, 1.3), (0.2, 60, 2)):
-        courses = there_and_back(kind, 600, Faults(loss=loss, seed=0))
+def test_300_items_over_a_quick_link(kind: MockKind) -> None:
+    for loss, seconds, messages in ((0.0, 3, 1), (0.05, 6, 1.3), (0.2, 30, 2)):
+        courses = there_and_back(kind, 300, Faults(loss=loss, seed=0))
         assert sum(course.took for course in courses) < seconds
         for course in courses:
             assert course.status in ("accepted", "unknown")
-            assert max(course.ours, course.theirs) <= messages * 600
+            assert max(course.ours, course.theirs) <= messages * 300
 
 
 @KINDS
