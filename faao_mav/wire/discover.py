@@ -26,13 +26,10 @@ from faao_mav.wire.transport import Origin
 _MAIN = 1
 """MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
-_BOOT, _SETTLE, _LOOK_AGAIN = 60.0, 1.2, 0.2
-"""Seconds that a vehicle may boot; after the first vehicle in which others are heard; and between
-two looks at whether all have booted. Chosen: a heartbeat's period is a second."""
-
-_GREET, _KNOCK = 1.0, 2.0
-"""Seconds between two questions to whoever is there, and of silence before a heartbeat is sent into
-it. Chosen: one and two heartbeats of a vehicle."""
+_BOOT, _SETTLE, _GREET, _KNOCK = 60.0, 1.2, 1.0, 2.0
+"""Seconds that a vehicle may boot; after the first vehicle in which others are heard; between two
+questions to whoever is there; and of silence before a heartbeat is sent into it. Chosen: vehicles
+send a heartbeat each second."""
 
 _NOTHING = "is it switched on and connected there, and no other program in between?"
 
@@ -99,7 +96,7 @@ def discover(
     """
     line = yield AT_ONCE
     line.progress = "listening for a vehicle", 0, 0
-    begun = due = settled = line.now
+    begun = greet = settled = line.now
     found, others = dict[Address, FoundVehicle](), dict[Address, str]()
     origins = dict[Address, dict[Origin, None]]()
     while True:
@@ -115,23 +112,20 @@ def discover(
                     others[sender] = str(vehicle)
                 else:
                     if not found:
-                        due = settled = line.now + _SETTLE * (system is None or listens)
+                        settled = line.now + _SETTLE * (system is None or listens)
                     armed = vehicle.armed or (sender in found and found[sender].armed)
                     found[sender] = replace(vehicle, armed=armed)
-        if line.now >= due and not found and line.now < begun + patience:
+        booting = any(not each.ready for each in found.values()) and line.now < begun + _BOOT
+        until = max(settled, begun + _BOOT if booting else 0.0) if found else begun + patience
+        if line.now >= until:
+            break
+        if not found and line.now >= greet:
             late = knocks and line.now >= begun + _KNOCK
             line.say(Timesync(0, int(line.now * 1e9)), *[_KNOCKING] * late)
-            due = min(line.now + _GREET, begun + patience)
-        elif line.now >= due:
-            ready = all(each.ready for each in found.values()) or line.now >= begun + _BOOT
-            if line.now >= settled and ready:
-                vehicles = (
-                    replace(found[address], origins=tuple(origins[address]))
-                    for address in sorted(found)
-                )
-                return Heard(tuple(vehicles), tuple(others.values()))
-            due = line.now + _LOOK_AGAIN
-        line = yield due
+            greet = line.now + _GREET
+        line = yield until if found else min(greet, until)
+    vehicles = (replace(found[each], origins=tuple(origins[each])) for each in sorted(found))
+    return Heard(tuple(vehicles), tuple(others.values()))
 
 
 def choose(
