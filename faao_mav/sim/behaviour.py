@@ -20,9 +20,6 @@ MockKind: TypeAlias = Literal["ardupilot", "px4"]
 COUNT = -1
 """In `Behaviour.refusals`: instead of an item, the announcement of the list."""
 
-_RALLY_HIGHEST = 2**15
-"""The altitude from which on ArduPilot refuses a rally point, m: what 16 bits hold."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Behaviour:
@@ -76,7 +73,7 @@ def _ardupilot_answer(part: MissionType, item: WireItem) -> MavResult:
         return MavResult.UNSUPPORTED
     if item.frame not in GLOBAL_FRAMES:
         return MavResult.UNSUPPORTED_FRAME
-    fits = not rally or abs(item.z) < _RALLY_HIGHEST
+    fits = not rally or abs(item.z) < 2**15  # m: what 16 bits hold
     return MavResult.ACCEPTED if fits else MavResult.INVALID_PARAM7
 
 
@@ -104,35 +101,31 @@ def _px4_infeasible(mission: Mission) -> str:
     return "starts with landing" if flying[:1] == [Command.NAV_LAND] else ""
 
 
-_ARDUPILOT = Behaviour(
-    family=ARDUPILOT,
-    mission_limit=655,  # as in its simulator
-    answer=_ardupilot_answer,
-    requested_mode=lambda mode, _: mode if mode >= 0 else None,
-    no_mode=2,  # denied
-    denied=4,  # failed
-    returns_by_mode=frozenset({"plane"}),
-    parameters={"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4},
-    tells_no_place=True,
-    armed_inside_only=True,
-)
-
-_PX4 = Behaviour(
-    family=PX4,
-    mission_limit=1000,
-    answer=_px4_answer,
-    requested_mode=lambda main, sub: px4_mode(main, sub) or None,
-    no_mode=0,  # accepted, but nothing changes
-    denied=1,  # temporarily rejected
-    returns_by_mode=frozenset({"copter", "plane"}),
-    numbers_lists=True,
-    silent_at_boot=True,
-    infeasible=_px4_infeasible,
-)
-
 _BEHAVIOURS: dict[MockKind, Behaviour] = {
-    "ardupilot": _ARDUPILOT,
-    "px4": _PX4,
+    "ardupilot": Behaviour(
+        family=ARDUPILOT,
+        mission_limit=655,  # as in its simulator
+        answer=_ardupilot_answer,
+        requested_mode=lambda mode, _: mode if mode >= 0 else None,
+        no_mode=2,  # denied
+        denied=4,  # failed
+        returns_by_mode=frozenset({"plane"}),
+        parameters={"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4},
+        tells_no_place=True,
+        armed_inside_only=True,
+    ),
+    "px4": Behaviour(
+        family=PX4,
+        mission_limit=1000,
+        answer=_px4_answer,
+        requested_mode=lambda main, sub: px4_mode(main, sub) or None,
+        no_mode=0,  # accepted, but nothing changes
+        denied=1,  # temporarily rejected
+        returns_by_mode=frozenset({"copter", "plane"}),
+        numbers_lists=True,
+        silent_at_boot=True,
+        infeasible=_px4_infeasible,
+    ),
 }
 
 

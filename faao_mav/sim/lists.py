@@ -220,7 +220,7 @@ class StoredLists:
             if seq not in (under_way.passed, under_way.passed - 1) or seq == under_way.count:
                 return self._end(under_way, MavResult.ERROR)
             under_way.heard, under_way.passed, items = self._now, seq + 1, under_way.items
-        elif under_way is not None and not request.legacy:
+        elif under_way is not None and not isinstance(request, messages.MissionRequest):
             return _ack(sender, part, self._busy)
         if seq >= len(items):
             wrong = MavResult.ERROR if part is MissionType.MISSION else MavResult.INVALID_SEQUENCE
@@ -243,8 +243,8 @@ class StoredLists:
 
     def _ask(self, upload: _Transfer) -> list[Message]:
         upload.asked = self._now
-        part, seq = upload.part, upload.passed
-        return [messages.MissionRequestInt(upload.partner, part, seq, self._legacy)]
+        kind = messages.MissionRequest if self._legacy else messages.MissionRequestInt
+        return [kind(upload.partner, upload.part, upload.passed)]
 
     def _end(self, transfer: _Transfer, result: MavResult) -> list[Message]:
         del self._transfers[self._slot(transfer.part)]

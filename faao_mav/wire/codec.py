@@ -1,7 +1,7 @@
 """Packets to messages and back, by pymavlink, always MAVLink 2."""
 
 import re
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from faao_mav.wire import messages
@@ -19,9 +19,8 @@ _KINDS: dict[str, type[Message]] = {
 
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
-_LEGACY, _BEYOND = "MISSION_REQUEST", ("opaque_id", "mission_id")
-"""The predecessor of MISSION_REQUEST_INT, with the same fields; and fields of 4 bytes behind those
-that the dialects of pymavlink know."""
+_BEYOND = ("opaque_id", "mission_id")
+"""Fields behind those that the dialects of pymavlink know, of 4 bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,14 +55,11 @@ class Codec:
 
     def pack(self, message: Message) -> bytes:
         """Return the packet that carries `message`; fields that it does not have are zeros."""
-        name = _NAMES[type(message)]
-        values = {field.name: getattr(message, field.name) for field in fields(message)}
-        if values.pop("legacy", False):
-            name = _LEGACY
-        if (target := values.pop("target", None)) is not None:
+        name, values = _NAMES[type(message)], dict(vars(message))
+        if (target := values.get("target")) is not None:
             values |= {"target_system": target.system, "target_component": target.component}
-        if (item := values.pop("item", None)) is not None:
-            values |= {field.name: getattr(item, field.name) for field in fields(item)}
+        if (item := values.get("item")) is not None:
+            values |= asdict(item)
             values |= {f"param{number}": value for number, value in enumerate(item.params, 1)}
         kind = getattr(self._dialect, f"MAVLink_{name.lower()}_message")
         numbers: list[Any] = []
@@ -107,30 +103,24 @@ class Codec:
 
 def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
     """Return what `packet` says, None where its message is not known here."""
-    name = packet.get_type()
-    legacy = name == _LEGACY
-    kind = _KINDS.get(f"{name}_INT" if legacy else name)
+    kind = _KINDS.get(packet.get_type())
     if kind is None:
         return None
-    values: dict[str, Any] = {}
-    for field in fields(kind):
-        match field.name:
-            case "target":
-                value: Any = Address(packet.target_system, packet.target_component)
-            case "opaque_id" | "mission_id":
-                rest = (payload_of(raw) or b"")[packet.unpacker.size :]
-                value = int.from_bytes(rest[:4], "little")
-            case "legacy":
-                value = legacy
-            case "item":
-                p = packet
-                params = (p.param1, p.param2, p.param3, p.param4)
-                value = WireItem(
-                    p.command, p.frame, params, p.x, p.y, p.z, p.current, p.autocontinue
-                )
-            case plain:
-                value = getattr(packet, plain)
-                if isinstance(value, str):  # on one line: what moves a terminal's cursor is blank
-                    value = "".join(each if each.isprintable() else " " for each in value)
-        values[field.name] = value
+    values = {field.name: _on_one_line(getattr(packet, field.name, 0)) for field in fields(kind)}
+    if "target" in values:
+        values["target"] = Address(packet.target_system, packet.target_component)
+    if "item" in values:
+        p = packet
+        params = (p.param1, p.param2, p.param3, p.param4)
+        flags = (p.current, p.autocontinue)
+        values["item"] = WireItem(p.command, p.frame, params, p.x, p.y, p.z, *flags)
+    for name in values.keys() & _BEYOND:
+        rest = (payload_of(raw) or b"")[packet.unpacker.size :]
+        values[name] = int.from_bytes(rest[:4], "little")
     return Envelope(sender_of(raw), kind(**values), origin)
+
+
+def _on_one_line(value: Any) -> Any:
+    """Return a text without what moves a terminal's cursor, and anything else as it is."""
+    is_text = isinstance(value, str)
+    return "".join(c if c.isprintable() else " " for c in value) if is_text else value

@@ -110,9 +110,7 @@ def upload_parts(
 
 
 def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> Talk[PartReport]:
-    attempt = 0
-    while True:
-        attempt += 1
+    for attempt in range(1, ATTEMPTS + 1):
         sent = yield from send_list(items, peer, part)
         report = replace(sent, items=len(items[home_items(peer.vehicle, part) :]), attempts=attempt)
         doubtful = sent.result in TENTATIVE
@@ -133,8 +131,9 @@ def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> 
         # DENIED, but not if it is said of every announcement of a whole attempt.
         passes = doubtful and not (report.result == MavResult.DENIED and report.item is None)
         refused = report.verdict == "refused" and not passes
-        if refused or report.verdict in ("verified", "armed") or (attempt == ATTEMPTS):
-            return report
+        if refused or report.verdict in ("verified", "armed"):
+            break
+    return report
 
 
 def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:

@@ -62,10 +62,13 @@ class MissionCount(ListMessage):
 
 
 class MissionRequestInt(ListMessage):
-    """MISSION_REQUEST_INT, or its predecessor MISSION_REQUEST (`legacy`)."""
+    """MISSION_REQUEST_INT."""
 
     seq: int
-    legacy: bool = False
+
+
+class MissionRequest(MissionRequestInt):
+    """MISSION_REQUEST, the predecessor of MISSION_REQUEST_INT."""
 
 
 class MissionItemInt(ListMessage):

@@ -15,6 +15,7 @@ from faao_mav.wire.messages import (
     MissionAck,
     MissionCount,
     MissionItemInt,
+    MissionRequest,
     MissionRequestInt,
     MissionRequestList,
     Statustext,
@@ -128,7 +129,8 @@ def test_px4_changes_its_request_when_told_unsupported_and_is_freed_by_a_cancell
     desk = desk_for("px4")
     (request,) = desk.tell(count(3))
     (other,) = desk.tell(MissionAck(VEHICLE, 0, MavResult.UNSUPPORTED))
-    assert (request.legacy, other.legacy, other.seq) == (True, False, 0)
+    assert request == MissionRequest(GROUND_STATION, 0, 0)
+    assert other == MissionRequestInt(GROUND_STATION, 0, 0)
     desk.tell(MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED))
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 

@@ -35,6 +35,7 @@ from faao_mav.wire.messages import (
     MissionClearAll,
     MissionCount,
     MissionItemInt,
+    MissionRequest,
     MissionRequestInt,
     MissionRequestList,
     WireItem,
@@ -141,7 +142,8 @@ def _written(message: Message) -> str:
         case MissionCount():
             return f"count {part} {message.count}"
         case MissionRequestInt():
-            return f"request {part} {message.seq}" + " legacy" * message.legacy
+            legacy = " legacy" * isinstance(message, MissionRequest)
+            return f"request {part} {message.seq}{legacy}"
         case MissionAck():
             return f"ack {part} {MavResult(message.type).name}"
         case MissionItemInt(seq=seq, item=item):

@@ -21,6 +21,7 @@ from faao_mav.wire.messages import (
     MissionAck,
     MissionCount,
     MissionItemInt,
+    MissionRequest,
     MissionRequestInt,
     ParamValue,
     Statustext,
@@ -120,7 +121,7 @@ MESSAGES: list[Message] = [
     MissionAck(GROUND_STATION, 2, 4, 7),
     MissionAck(GROUND_STATION, 2, 4),
     MissionRequestInt(GROUND_STATION, 1, 12),
-    MissionRequestInt(GROUND_STATION, 1, 12, legacy=True),
+    MissionRequest(GROUND_STATION, 1, 12),
     CommandLong(VEHICLE, 400, 0, 1.0),
     ParamValue("WPNAV_SPEED", 1000.0, 9, 12, 3),
 ]
