@@ -8,7 +8,6 @@ import contextlib
 import errno
 import select
 import socket
-import time
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -24,10 +23,9 @@ _CONNECT_TIMEOUT, _WRITE_TIMEOUT = 5.0, 5.0
 """Seconds to wait for a TCP connection, and in which a serial port has to take a packet: chosen,
 above the 4.3 s in which a line of 9600 baud empties the 4096 bytes that Linux keeps for it."""
 
-_FORGET, _MOST_PEERS, _BURST = 30.0, 64, 256
-"""Seconds after which a silent UDP sender is not answered any more, 30 lost heartbeats; the most
-UDP senders that are remembered, and TCP peers: each is sent every packet; the most datagrams that
-are read at once: who sends without end stops nothing else. Chosen."""
+_MOST_PEERS, _BURST = 64, 256
+"""The most UDP senders that are remembered, and TCP peers: each is sent every packet; and datagrams
+that are read at once: who sends without end stops nothing else. Chosen."""
 
 _REASONS = {
     errno.EADDRINUSE: "the port is in use; stop who listens there, or take another port",
@@ -52,7 +50,7 @@ class Transport(Protocol):
         """Return the packets that arrive within `timeout` seconds, as soon as something does."""
 
     def write(self, data: bytes, to: Origin | None = None, /) -> None:
-        """Send one packet to `to`, or to everybody who was heard of late."""
+        """Send one packet to `to`, or to everybody who was heard."""
 
     def close(self) -> None:
         """Let go of the connection."""
@@ -129,8 +127,8 @@ class _Udp:
     def __init__(self, address: _Place, *, listens: bool) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._target, self.listens = None if listens else address, listens
-        self._senders: dict[_Place, tuple[float, Framer]] = {}
-        """When each was heard last, s, and what cuts it up; who is silent longest comes first."""
+        self._senders: dict[_Place, Framer] = {}
+        """What cuts up what each sends; who is silent longest comes first."""
         self._socket.setblocking(False)
         if listens:
             try:
@@ -152,8 +150,7 @@ class _Udp:
         return found
 
     def write(self, data: bytes, to: Origin | None = None) -> None:
-        recent = time.monotonic() - _FORGET
-        targets = [place for place, (heard, _) in self._senders.items() if heard > recent]
+        targets = list(self._senders)
         if self._target is not None:
             targets = [self._target]
         elif to is not None:
@@ -169,10 +166,10 @@ class _Udp:
 
     def _framer(self, address: _Place) -> Framer:
         """Return what cuts up what comes from `address`; too many forget who is silent longest."""
-        _, framer = self._senders.pop(address, (0.0, Framer()))
+        framer = self._senders.pop(address, None) or Framer()
         if len(self._senders) == _MOST_PEERS:
             del self._senders[next(iter(self._senders))]
-        self._senders[address] = time.monotonic(), framer
+        self._senders[address] = framer
         return framer
 
 
