@@ -21,7 +21,7 @@ from faao_mav.wire.transfer import (
 )
 from faao_mav.wire.verify import compare
 from faao_mav.wire.whereabouts import Whereabouts
-from faao_mav.wire.wire_items import autopilot_name, home_items
+from faao_mav.wire.wire_items import home_items
 
 _ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
 """What a vehicle answers that has no such list at all."""
@@ -205,7 +205,7 @@ def what_is_left(peer: Peer) -> str:
     """Return in words what a vehicle may hold when a change of its lists has stopped half-way."""
     if peer.vehicle is None:
         return "What the vehicle holds now is not known: upload again, or download it"
-    name = autopilot_name(peer.vehicle)
+    name = peer.vehicle.family.name
     if peer.vehicle.dialect.atomic:
         return f"{name} holds the old list or the new one, whole: download it to see which"
     return f"{name} may now hold old and new items mixed: upload again before flying"

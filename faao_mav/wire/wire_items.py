@@ -63,17 +63,10 @@ def wire_items(
 
 def mission_item(item: WireItem) -> MissionItem:
     """Return `item` in degrees, or in the units of its frame."""
-    scale = coordinate_scale(item.frame)
-    params = tuple(map(_finite_or_nan, item.params))
-    return MissionItem(
-        item.command,
-        item.frame,
-        (params[0], params[1], params[2], params[3]),
-        item.x / scale,
-        item.y / scale,
-        _finite_or_nan(item.z),
-        bool(item.autocontinue),
-    )
+    scale, numbers = coordinate_scale(item.frame), (*item.params, item.z)
+    p1, p2, p3, p4, z = (value if math.isfinite(value) else math.nan for value in numbers)
+    x, y, goes_on = item.x / scale, item.y / scale, bool(item.autocontinue)
+    return MissionItem(item.command, item.frame, (p1, p2, p3, p4), x, y, z, goes_on)
 
 
 def mission_of(
@@ -104,15 +97,13 @@ def _check(item: WireItem, name: str) -> None:
 
 def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
     """Return `item` as `vehicle` is sent it; see `wire_items`."""
-    unset = [
-        name
-        for name, value in (("latitude", item.x), ("longitude", item.y), ("altitude", item.z))
-        if math.isnan(value)
-    ]
+    place = {"latitude": item.x, "longitude": item.y, "altitude": item.z}
+    unset = [name for name, value in place.items() if math.isnan(value)]
     if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
+        who = "an autopilot unknown here" if vehicle is None else vehicle.family.name
         raise InputError(
-            f"item {index}: {' and '.join(unset)} not set, which {autopilot_name(vehicle)} would "
-            "take for 0: give the place"
+            f"item {index}: {' and '.join(unset)} not set, which {who} would take for 0: give the "
+            "place"
         )
     return item if vehicle is None else vehicle.dialect.sent(item)
 
@@ -136,12 +127,3 @@ def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireIt
     return WireItem(
         item.command, item.frame, item.params, x, y, item.z, int(current), int(item.autocontinue)
     )
-
-
-def _finite_or_nan(value: float) -> float:
-    return value if math.isfinite(value) else math.nan
-
-
-def autopilot_name(vehicle: VehicleType | None) -> str:
-    """Return what people call the autopilot of `vehicle`."""
-    return "an autopilot unknown here" if vehicle is None else vehicle.family.name
