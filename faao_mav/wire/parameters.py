@@ -87,8 +87,8 @@ def read_parameters(
         while left and room < _AT_ONCE:
             names = left.pop(0)
             room += len(names)
-            reads = {name: ParamRequestRead(peer.address, name, -1) for name in names}
-            questions.put(names, *(setting.get(name, reads[name]) for name in names))
+            reads = (ParamRequestRead(peer.address, name, -1) for name in names)
+            questions.put(names, *(setting.get(each.param_id, each) for each in reads))
         done = total - len(left) - len(questions.asked)
         line.progress = f"{'setting' if setting else 'reading'} parameters", done, total
         heard = yield from questions.hear()

@@ -25,7 +25,6 @@ from faao_mav.wire.messages import (
     MissionRequestInt,
     ParamValue,
     Statustext,
-    WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.wire_items import mission_of, wire_items
@@ -113,7 +112,6 @@ def packets(*messages: Message) -> list[bytes]:
     return [codec.pack(message) for message in messages]
 
 
-ROW = WireItem(16, 3, (1.5, 0.0, 0.0, math.pi), -353_632_621, 1_491_652_371, 12.25, 1, 0)
 MESSAGES: list[Message] = [
     Heartbeat(2, 3, 128, 3, 4),
     Statustext(4, "Only 655 items are supported"),
@@ -137,18 +135,6 @@ def test_messages_survive_the_wire() -> None:
     found = [packet for data in packets(*MESSAGES) for packet in codec.parse(data)]
     assert [message_of(packet) for packet in found] == MESSAGES
     assert {packet.envelope and packet.envelope.sender for packet in found} == {VEHICLE}
-
-
-def test_pymavlink_reads_the_packets() -> None:
-    reader = common.MAVLink(None)
-    count, item = packets(
-        MissionCount(GROUND_STATION, 1, 700, 5), MissionItemInt(GROUND_STATION, 2, 3, ROW)
-    )
-    (message,) = reader.parse_buffer(count)
-    assert (message.get_type(), message.count, message.mission_type) == ("MISSION_COUNT", 700, 1)
-    (message,) = reader.parse_buffer(item)
-    assert (message.get_type(), message.x, message.seq) == ("MISSION_ITEM_INT", ROW.x, 3)
-    assert message.get_msgbuf()[0] == 0xFD
 
 
 def test_damaged_and_unknown_packets_are_passed_over() -> None:
