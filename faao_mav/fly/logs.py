@@ -14,30 +14,43 @@ import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import closing, redirect_stderr, redirect_stdout, suppress
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from faao_mav.errors import InputError, check_extra, shortened
-from faao_mav.validate.flown import Fix, FlightRecord
+
+if TYPE_CHECKING:
+    from faao_mav.validate.flown import FlightRecord
 
 Said: TypeAlias = tuple[int, int, str, Mapping[str, Any]]
 """System and component of MAVLink that said it, 0 in a vehicle's own log; name; values by field."""
 
-_PLACES = ("POS", "GLOBAL_POSITION_INT", "vehicle_global_position", "home_position")
+_PLACES = {
+    "POS": {"TimeUS": 1e6, "Lat": 1, "Lng": 1, "Alt": 1, "RelHomeAlt": 1},
+    "GLOBAL_POSITION_INT": {
+        "time_boot_ms": 1e3, "lat": 1e7, "lon": 1e7, "alt": 1e3, "relative_alt": 1e3,
+    },
+    "vehicle_global_position": {"timestamp": 1e6, "lat": 1, "lon": 1, "alt": 1},
+}  # fmt: skip
+"""Messages about positions, and what their fields count in a second, a degree and a metre: the
+time, latitude, longitude, the height above the sea and that above home."""
+
 _PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
 _WINDS = {
-    **dict.fromkeys(("XKF2", "NKF2"), ("VWE", "VWN")),
+    "XKF2": ("VWE", "VWN"),
     "WIND_COV": ("wind_y", "wind_x"),
     "WIND": ("direction", "speed"),
-    **dict.fromkeys(("wind", "wind_estimate"), ("windspeed_east", "windspeed_north")),
+    "wind": ("windspeed_east", "windspeed_north"),
 }
-"""Messages about parameters and wind, newer ones first, and their fields: towards east and north,
-but of WIND whence, degrees, and how fast."""
+"""Messages about parameters and wind, and their fields: towards east and north, but of WIND whence,
+degrees, and how fast."""
 
 _RADIOS = {"RADIO_STATUS": "rssi", "RADIO": "rssi", "RAD": "RSSI", "radio_status": "rssi"}
 """Messages of telemetry radios, and the field with the level that they count."""
+
+_ASKED = ["home_position", *_PLACES, *_PARAMETERS, *_WINDS, *_RADIOS]
 
 _UNKNOWN = 255
 """The level of a radio that does not know it (MAVLink, RADIO_STATUS)."""
@@ -64,7 +77,7 @@ _ENVIRONMENT = {"MAVLINK20": "1", "MAVLINK_DIALECT": "ardupilotmega", "OPENBLAS_
 """Of the process that reads: the MAVLink that pymavlink is to read, no threads."""
 
 
-def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
+def read_log(path: Path, system: int | None = None) -> "list[FlightRecord]":
     """Return the flights in a log: ArduPilot's `.bin`, `.tlog` of a ground station, PX4's `.ulg`.
 
     There are several where several vehicles tell their positions in a `.tlog`, unless `system`
@@ -75,6 +88,8 @@ def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
     >>> flight.system, bool(flight.t[-1] - flight.t[0] > 60)
     (1, True)
     """
+    from faao_mav.validate.flown import FlightRecord  # which that process need not import
+
     ending = path.suffix.lower()
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
@@ -101,8 +116,8 @@ def read_log(path: Path, system: int | None = None) -> list[FlightRecord]:
     return [FlightRecord.of(*each) for each in json.loads(read.stdout)]
 
 
-Flown: TypeAlias = tuple[list[Fix], dict[str, float], int]
-"""What `FlightRecord.of` takes."""
+Flown: TypeAlias = tuple[list[tuple[float, ...]], dict[str, float], int]
+"""What `FlightRecord.of` takes: for each position what a `Fix` has."""
 
 
 def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
@@ -133,7 +148,7 @@ def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
         numbers = ", ".join(map(str, filter(None, flown)))
         raise InputError(f"--system {system}: not in {path}, where positions are of: {numbers}")
     chosen = {number: each for number, each in flown.items() if system in (0, number)}
-    longest = max(each.fixes[-1].t - each.fixes[0].t for each in chosen.values())
+    longest = max(each.fixes[-1][0] - each.fixes[0][0] for each in chosen.values())
     if longest > _LONGEST:
         raise InputError(f"{path}: {longest / 3600:.0f} hours; expected the log of a flight")
     return [(each.found(), each.parameters, number) for number, each in chosen.items()]
@@ -143,11 +158,10 @@ class _Heard:
     """What one sender has said of its flight: `fixes`, and `parameters` by name."""
 
     def __init__(self) -> None:
-        self.fixes: list[Fix] = []
+        self.fixes: list[tuple[float, ...]] = []
         self.parameters: dict[str, float] = {}
         self._last, self._later, self._home = math.nan, 0.0, math.nan
-        self._estimator, self._wind = len(_WINDS), (math.nan, math.nan)
-        self._rssi = math.nan
+        self._wind, self._rssi = (math.nan, math.nan), math.nan
 
     def hear(self, name: str, said: Mapping[str, Any]) -> None:
         """Take note of a message."""
@@ -156,25 +170,23 @@ class _Heard:
             found = said.get(field, math.nan)
             return float(found) if isinstance(found, int | float) else math.nan
 
-        match name:
-            case "GLOBAL_POSITION_INT":
-                t, *heights = (value(x) / 1e3 for x in ("time_boot_ms", "alt", "relative_alt"))
-                self._be(t, value("lat") / 1e7, value("lon") / 1e7, *heights)
-            case "POS":
-                place = value("Lat"), value("Lng"), value("Alt"), value("RelHomeAlt")
-                self._be(value("TimeUS") / 1e6, *place)
-            case "vehicle_global_position":
-                self._be(value("timestamp") / 1e6, value("lat"), value("lon"), value("alt"))
-            case "home_position" if said.get("valid_alt", True):
-                self._home = value("alt")
-            case "PARM" | "PARAM_VALUE":
-                key, field = _PARAMETERS[name]
-                if math.isfinite(value(field)):
-                    self.parameters[str(said.get(key))] = value(field)
-            case _ if name in _RADIOS:
-                self._rssi = value(_RADIOS[name])
-            case _ if name in _WINDS and not said.get("C", 0):  # the first of the estimators
-                self._blow(name, *map(value, _WINDS[name]))
+        if name in _PLACES:
+            self._be(*(value(field) / unit for field, unit in _PLACES[name].items()))
+        elif name in _PARAMETERS:
+            key, field = _PARAMETERS[name]
+            if math.isfinite(value(field)):
+                self.parameters[str(said.get(key))] = value(field)
+        elif name in _RADIOS:
+            self._rssi = math.nan if value(_RADIOS[name]) == _UNKNOWN else value(_RADIOS[name])
+        elif name in _WINDS and not said.get("C", 0):  # the first of the estimators
+            east, north = map(value, _WINDS[name])
+            if name == "WIND":
+                angle, speed = math.radians(east), north
+                east, north = -speed * math.sin(angle), -speed * math.cos(angle)
+            if 0 < math.hypot(east, north) <= _FASTEST_WIND:  # one that does not run tells 0
+                self._wind = east, north
+        elif name == "home_position" and said.get("valid_alt", True):
+            self._home = value("alt")
 
     def _be(
         self, t: float, latitude: float, longitude: float, altitude: float, height: float = math.nan
@@ -194,24 +206,15 @@ class _Heard:
         self._last = t
         if abs(height) <= _BOUNDS[-1]:
             self._home = altitude - height
-        rssi = math.nan if self._rssi == _UNKNOWN else self._rssi
-        self.fixes.append(Fix(t + self._later, *place, self._home, *self._wind, rssi))
+        self.fixes.append((t + self._later, *place, self._home, *self._wind, self._rssi))
         self._rssi = math.nan
 
-    def _blow(self, name: str, east: float, north: float) -> None:
-        """Take note of a wind, if no better estimator tells one; one that does not run tells 0."""
-        if name == "WIND":
-            angle, speed = math.radians(east), north
-            east, north = -speed * math.sin(angle), -speed * math.cos(angle)
-        rank, told = [*_WINDS].index(name), 0 < math.hypot(east, north) <= _FASTEST_WIND
-        if rank <= self._estimator and told:
-            self._estimator, self._wind = rank, (east, north)
-
-    def found(self) -> list[Fix]:
+    def found(self) -> list[tuple[float, ...]]:
         """Return the flight; until home is told it is where it is first told, or where it began."""
-        known = (each.home for each in self.fixes if math.isfinite(each.home))
-        home = next(known, self.fixes[0].altitude)
-        return [x if math.isfinite(x.home) else x._replace(home=home) for x in self.fixes]
+        altitudes, homes = ([each[n] for each in self.fixes] for n in (3, 4))
+        first = next(filter(math.isfinite, homes), altitudes[0])
+        told = (home if math.isfinite(home) else first for home in homes)
+        return [(*x[:4], home, *x[5:]) for x, home in zip(self.fixes, told, strict=True)]
 
 
 def messages(path: Path) -> Iterator[Said]:
@@ -232,9 +235,7 @@ def _mavlog(path: Path, *, own: bool) -> Iterator[Said]:
     except AttributeError:  # a log that ends in the first message of its kind
         log = mavutil.mavlogfile(str(path))  # which takes ten times as long
     with closing(log):
-        while (
-            message := log.recv_match(type=[*_PLACES, *_PARAMETERS, *_WINDS, *_RADIOS])
-        ) is not None:
+        while (message := log.recv_match(type=_ASKED)) is not None:
             sender = (0, 0) if own else (message.get_srcSystem(), message.get_srcComponent())
             yield *sender, message.get_type(), message.to_dict()
 
@@ -243,7 +244,7 @@ def _ulog(path: Path) -> Iterator[Said]:
     from pyulog import ULog
 
     with path.open("rb") as file:
-        log = ULog(file, [*_PLACES, *_WINDS, *_RADIOS])
+        log = ULog(file, _ASKED)
     for name, value in log.initial_parameters.items():
         yield 0, 0, "PARM", {"Name": name, "Value": value}
     rows: list[tuple[float, str, dict[str, float]]] = []
@@ -256,27 +257,23 @@ def _ulog(path: Path) -> Iterator[Said]:
         yield 0, 0, name, row
 
 
-def _main(path: Path, system: int) -> int:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    with os.fdopen(os.dup(1), "w") as out, os.fdopen(os.dup(2), "w") as failed:
-        for number in (1, 2):  # for the libraries' own remarks, a line for each byte of zeros
-            os.dup2(nowhere, number)
-        for limit, most in (("RLIMIT_CPU", _PATIENCE), ("RLIMIT_DATA", _BYTES)):
-            with suppress(ImportError, ValueError):  # Windows; the user's own limit is lower
-                import resource
+def _main(path: Path, system: int) -> None:
+    for limit, most in (("RLIMIT_CPU", _PATIENCE), ("RLIMIT_DATA", _BYTES)):
+        with suppress(ImportError, ValueError):  # Windows; the user's own limit is lower
+            import resource
 
-                resource.setrlimit(getattr(resource, limit), (most, most))
-        try:
-            json.dump(flights(path, messages(path), system), out)
-        except InputError as error:
-            print(error, file=failed)
-            return 1
-        except Exception as error:  # what libraries make of files that are something else
-            reason = shortened(f"{type(error).__name__}: {error}")
-            print(f"{path}: not a {path.suffix} log: {reason}", file=failed)
-            return 1
-    return 0
+            resource.setrlimit(getattr(resource, limit), (most, most))
+    try:
+        # The libraries' own remarks go nowhere: they are a line for each byte of zeros.
+        with Path(os.devnull).open("w") as out, redirect_stdout(out), redirect_stderr(out):
+            found = flights(path, messages(path), system)
+    except InputError as error:
+        sys.exit(str(error))
+    except Exception as error:  # what libraries make of files that are something else
+        reason = shortened(f"{type(error).__name__}: {error}")
+        sys.exit(f"{path}: not a {path.suffix} log: {reason}")
+    json.dump(found, sys.stdout)
 
 
 if __name__ == "__main__":
-    sys.exit(_main(Path(sys.argv[1]), int(sys.argv[2])))
+    _main(Path(sys.argv[1]), int(sys.argv[2]))

@@ -7,12 +7,10 @@ are made by `tests/flight_logs.py` with these positions; `tests/real_autopilots/
 debriefs the log of a real PX4.
 """
 
-import json
-import struct
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,54 +18,54 @@ from conftest import edited
 from flight_logs import dataflash, heard, heights, kept, tlog, ulog
 from hypothesis import given
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from faao_mav.cli.main import app
-from faao_mav.errors import InputError
+from faao_mav.errors import FaaoError, InputError
 from faao_mav.fly import logs
 from faao_mav.fly.logs import Said, flights, messages, read_log
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import parse_plan
+from faao_mav.report.debrief import FromLog
+from faao_mav.report.page import render_report
 from faao_mav.validate.flown import FlightRecord
+from faao_mav.workflow import Result, with_mission
 
 LOGS = Path(__file__).parent.parent / "data" / "logs"
-PLAN = LOGS / "plan.yaml"
+PLAN = (LOGS / "plan.yaml").read_text()
 
 
-def the_flight(log: Path) -> FlightRecord:
-    (record,) = read_log(log)
+@cache
+def planned(autopilot: str) -> Result:
+    """Return the solved plan and its mission, for an autopilot."""
+    return with_mission(
+        Result(optimize(parse_plan(edited(PLAN, {"vehicle.autopilot": autopilot}))))
+    )
+
+
+def records(log: Path, system: int = 0) -> list[FlightRecord]:
+    """Return the flights in a log, as `read_log` does in a process of its own."""
+    return [FlightRecord.of(*each) for each in flights(log, messages(log), system)]
+
+
+def debriefed(log: Path, autopilot: str, system: int = 0) -> FromLog:
+    return FromLog.of(records(log, system), planned(autopilot), str(log))
+
+
+@cache
+def flown() -> FlightRecord:
+    """Return the flight in `px4.tlog`."""
+    (record,) = records(LOGS / "px4.tlog")
     return record
 
 
 @pytest.fixture(scope="module")
 def flight() -> FlightRecord:
     """The flight in `px4.tlog`, of which every other position is enough."""
-    return kept(the_flight(LOGS / "px4.tlog"), slice(None, None, 2))
+    return kept(flown(), slice(None, None, 2))
 
 
-@pytest.fixture(scope="module")
-def solutions(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The solved plan, for each autopilot."""
-    folder, found = tmp_path_factory.mktemp("solutions"), {}
-    for autopilot in ("ardupilot", "px4"):
-        found[autopilot] = folder / f"{autopilot}.npz"
-        plan = parse_plan(edited(PLAN.read_text(), {"vehicle.autopilot": autopilot}))
-        save_solution(optimize(plan), found[autopilot])
-    return found
-
-
-def debriefed(log: Path, solution: Path, *more: str) -> dict[str, Any]:
-    arguments = ["debrief", str(log), "--solution", str(solution), "--json", *more]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 0, result.output
-    told: dict[str, Any] = json.loads(result.stdout)
-    return told
-
-
-def test_both_logs_of_a_flight_tell_the_same(solutions: dict[str, Path]) -> None:
+def test_both_logs_of_a_flight_tell_the_same() -> None:
     own, heard = (
-        debriefed(LOGS / f"arducopter.{kind}", solutions["ardupilot"]) for kind in ("bin", "tlog")
+        debriefed(LOGS / f"arducopter.{kind}", "ardupilot").as_dict() for kind in ("bin", "tlog")
     )
     for name in ("rate_bs_uav", "rate_uav_user", "delivered_rate", "duration"):
         assert own["flown"][name] == pytest.approx(heard["flown"][name], rel=1e-3)
@@ -82,68 +80,61 @@ def test_both_logs_of_a_flight_tell_the_same(solutions: dict[str, Path]) -> None
     assert own["missing"] == 0
 
 
-def test_px4s_log_tells_what_was_heard(solutions: dict[str, Path], tmp_path: Path) -> None:
-    record = the_flight(LOGS / "px4.tlog")
+def test_px4s_log_tells_what_was_heard(tmp_path: Path) -> None:
     log = tmp_path / "flight.ulg"
-    log.write_bytes(ulog(record, wind=np.tile([3.0, -4.0], (len(record.t), 1))))
-    own = debriefed(log, solutions["px4"], "--report", str(tmp_path / "page.html"))
-    told = debriefed(LOGS / "px4.tlog", solutions["px4"])
+    log.write_bytes(ulog(flown(), wind=np.tile([3.0, -4.0], (len(flown().t), 1))))
+    found = debriefed(log, "px4")
+    own, told = found.as_dict(), debriefed(LOGS / "px4.tlog", "px4").as_dict()
     for name, value in told["flown"].items():
         assert own["flown"][name] == (value if value is None else pytest.approx(value, rel=1e-4))
     assert own["wind"] == pytest.approx([3.0, -4.0])
     assert (own["system"], told["system"]) == (None, 1)
-    page = (tmp_path / "page.html").read_text()
+    page = render_report(found, title="flight")
     assert "5.0 m/s from 323 degrees" in page
     assert "Distance from the planned place at equal times, as predicted and as flown" in page
 
 
-def test_what_a_radio_counted_is_compared_with_the_planned_gains(
-    solutions: dict[str, Path], tmp_path: Path
-) -> None:
+def test_what_a_radio_counted_is_compared_with_the_planned_gains(tmp_path: Path) -> None:
     """Levels that are 4 dB above and below d^-2 from the base station are that far from it."""
-    record, radio = the_flight(LOGS / "px4.tlog"), parse_plan(PLAN.read_text()).radio
-    line = record.line(load_solution(solutions["px4"]))
-    away = np.hypot(*(line.w - np.array(radio.base_station.position)).T)
+    solution = planned("px4").solution
+    line = flown().line(solution)
+    away = np.hypot(*(line.w - np.array(solution.plan.radio.base_station.position)).T)
     count = np.arange(len(away))
     level = -20 * np.log10(np.hypot(away, line.up)) + 4.0 * (-1) ** (count // 5)
     rssi = np.where(count % 5 == 0, np.round(150 + 1.9 * level), np.nan)
     log = tmp_path / "flight.tlog"
-    log.write_bytes(tlog(heard(replace(record, rssi=rssi))))
-    told = debriefed(log, solutions["px4"])["radio"]
+    log.write_bytes(tlog(heard(replace(flown(), rssi=rssi))))
+    told = debriefed(log, "px4").as_dict()["radio"]
     assert told["levels"] > 50
     assert told["base_station_db"] == pytest.approx(4.0, abs=0.3)
-    assert debriefed(LOGS / "px4.tlog", solutions["px4"])["radio"] is None
+    assert debriefed(LOGS / "px4.tlog", "px4").as_dict()["radio"] is None
 
 
-def test_parameters_other_than_the_missions_are_told(
-    solutions: dict[str, Path], tmp_path: Path
-) -> None:
-    log = tmp_path / "flight.bin"
-    data = (LOGS / "arducopter.bin").read_bytes()
-    assert data.count(struct.pack("<f", 600.0)) >= 1
-    log.write_bytes(data.replace(struct.pack("<f", 600.0), struct.pack("<f", 900.0)))
-    told = debriefed(log, solutions["ardupilot"])["parameters"]
-    assert told["WPNAV_SPEED"] == [900.0, 600.0]
+def test_parameters_other_than_the_missions_are_told(flight: FlightRecord, tmp_path: Path) -> None:
+    log, conversion = tmp_path / "flight.ulg", planned("px4").conversion
+    assert conversion is not None
+    name, due = next(iter(conversion.parameters.items()))
+    log.write_bytes(ulog(flight, parameters={**conversion.parameters, name: due + 1}))
+    told = debriefed(log, "px4").as_dict()["parameters"]
+    assert told == {name: (pytest.approx(due + 1), due)}
 
 
 def test_a_log_that_ends_in_the_middle_is_told_as_far_as_it_goes(
-    solutions: dict[str, Path], flight: FlightRecord, tmp_path: Path
+    flight: FlightRecord, tmp_path: Path
 ) -> None:
-    whole = debriefed(LOGS / "px4.tlog", solutions["px4"])
+    start = debriefed(LOGS / "px4.tlog", "px4").found.start
     cut = tmp_path / "cut.ulg"
-    cut.write_bytes(ulog(kept(flight, flight.t < whole["start"] + 40)))
-    found = debriefed(cut, solutions["px4"])
-    assert found["start"] == pytest.approx(whole["start"], abs=0.02)
-    assert found["missing"] == pytest.approx(60 - 0.5 - 40, abs=0.5)
-    cut.write_bytes(ulog(kept(flight, flight.t < whole["start"])))
-    arguments = ["debrief", str(cut), "--solution", str(solutions["px4"])]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 1
-    assert "the plan's flight is not in it" in result.output
+    cut.write_bytes(ulog(kept(flight, flight.t < start + 40)))
+    found = debriefed(cut, "px4").found
+    assert found.start == pytest.approx(start, abs=0.02)
+    assert found.missing == pytest.approx(60 - 0.5 - 40, abs=0.5)
+    cut.write_bytes(ulog(kept(flight, flight.t < start)))
+    with pytest.raises(FaaoError, match="the plan's flight is not in it"):
+        debriefed(cut, "px4")
     log = tmp_path / "cut.tlog"  # in the first message of its kind
     wind = heard(kept(flight, [-1]), wind=np.ones((1, 2)))[1:]
     log.write_bytes(tlog(heard(flight), wind)[:-5])
-    assert len(the_flight(log).t) == len(flight.t)
+    assert len(read_log(log)[0].t) == len(flight.t)
 
 
 @pytest.mark.parametrize("kind", ["bin", "tlog", "ulg"])
@@ -165,7 +156,7 @@ def test_every_kind_of_log_tells_the_flight(
     }
     log = tmp_path / f"flight.{kind.upper()}"
     log.write_bytes(written[kind])
-    record = the_flight(log)
+    (record,) = read_log(log)
     assert record.t == pytest.approx(flight.t, abs=1e-6)
     for name in ("latitude", "longitude"):
         assert getattr(record, name) == pytest.approx(getattr(flight, name), abs=1e-7)
@@ -175,9 +166,7 @@ def test_every_kind_of_log_tells_the_flight(
     assert record.mean_wind(record.t[0], 1e3) == pytest.approx([2.0, 1.0])
 
 
-def test_the_vehicle_whose_flight_is_the_plans(
-    solutions: dict[str, Path], flight: FlightRecord, tmp_path: Path
-) -> None:
+def test_the_vehicle_whose_flight_is_the_plans(flight: FlightRecord, tmp_path: Path) -> None:
     idle = replace(flight, latitude=flight.latitude + 0.01, altitude=flight.home)
     wind = np.tile([5.0, 5.0], (len(flight.t), 1))
     log = tmp_path / "two.tlog"
@@ -188,30 +177,22 @@ def test_the_vehicle_whose_flight_is_the_plans(
             heard(flight, sender=(2, 1)),
         )
     )
-    found = debriefed(log, solutions["px4"])
-    assert (found["system"], found["wind"]) == (2, None)
-    arguments = ["debrief", str(log), "--solution", str(solutions["px4"])]
-    told = CliRunner().invoke(app, arguments).output
-    assert "system 2, by its flight; also in the log: 7" in told
-    chosen = CliRunner().invoke(app, [*arguments, "--system", "2"])
-    assert chosen.exit_code == 0
-    assert "also in the log" not in chosen.output
-    for number, status, text in (
-        (7, 1, "the plan's flight is not in it"),
-        (3, 2, "--system 3: not in"),
-    ):
-        refused = CliRunner().invoke(app, [*arguments, "--system", str(number)])
-        assert refused.exit_code == status
-        assert text in refused.output
+    told = debriefed(log, "px4")
+    assert (told.as_dict()["system"], told.as_dict()["wind"]) == (2, None)
+    assert ("vehicle", "system 2, by its flight; also in the log: 7") in [*told.lines()]
+    assert len(debriefed(log, "px4", 2).records) == 1
+    with pytest.raises(FaaoError, match="the plan's flight is not in it"):
+        debriefed(log, "px4", 7)
+    with pytest.raises(InputError, match="--system 3: not in"):
+        debriefed(log, "px4", 3)
 
 
 def test_boots_in_one_log_stand_one_after_the_other(tmp_path: Path) -> None:
     once = (LOGS / "px4.tlog").read_bytes()
     log = tmp_path / "twice.tlog"
     log.write_bytes(once + once)
-    record = the_flight(log)
-    alone = the_flight(LOGS / "px4.tlog")
-    assert len(record.t) == 2 * len(alone.t)
+    (record,) = records(log)
+    assert len(record.t) == 2 * len(flown().t)
     assert (np.diff(record.t) > 0).all()
     assert np.diff(record.t).max() > 900
 
@@ -254,7 +235,7 @@ def test_no_code_of_the_current_directory_is_run(
         (tmp_path / f"{name}.py").write_text("open('run', 'w')")
     (tmp_path / "flight.tlog").write_bytes((LOGS / "px4.tlog").read_bytes())
     monkeypatch.chdir(tmp_path)
-    assert len(the_flight(Path("flight.tlog")).t) > 100
+    assert len(read_log(Path("flight.tlog"))[0].t) > 100
     assert not Path("run").exists()
 
 
@@ -325,24 +306,12 @@ def test_a_home_that_comes_late_or_never() -> None:
     assert heights(made_of(later)) == pytest.approx(10.0 + np.arange(POSITIONS))
 
 
-def test_wind_is_of_the_newest_that_estimates_it() -> None:
-    east = dict.fromkeys(("wind", "wind_estimate"), "windspeed_east") | {"WIND_COV": "wind_y"}
-    north = dict.fromkeys(("wind", "wind_estimate"), "windspeed_north") | {"WIND_COV": "wind_x"}
-    for winds, mean in (
-        ({"wind": 2.0, "wind_estimate": 9.0}, [2.0, 1.0]),
-        ({"wind": np.nan, "wind_estimate": 2.0}, [2.0, 1.0]),
-        ({"XKF2": 0.0, "NKF2": 2.0}, [2.0, 1.0]),
-        ({"NKF2": 9.0, "XKF2": 2.0}, [2.0, 1.0]),
-        ({"WIND_COV": 2.0}, [2.0, 1.0]),
-        ({"WIND_COV": np.nan}, None),
-        ({"XKF2": 1e30}, None),
-    ):
+def test_an_estimate_of_the_wind_that_is_none_does_not_count() -> None:
+    for value, mean in ((2.0, [2.0, 1.0]), (np.nan, None), (0.0, None), (1e30, None)):
         said: list[Said] = []
         for k in range(POSITIONS):
-            said.append(bin_position(k, 20.0, 500.0))
-            for name, x in winds.items():
-                fields = {east.get(name, "VWE"): x, north.get(name, "VWN"): x / 2}
-                said.append((0, 0, name, fields))
+            wind = {"wind_y": value, "wind_x": value / 2}
+            said += [bin_position(k, 20.0, 500.0), (0, 0, "WIND_COV", wind)]
         found = made_of(said).mean_wind(101.0, 12.0)
         assert found == (None if mean is None else pytest.approx(mean))
 
