@@ -111,36 +111,28 @@ def test_the_missions_own_parameters_are_set_and_no_others(tmp_path: Path, to: s
         assert mock.parameters.values == before | {"WPNAV_ACCEL": 400.0}
 
 
-def test_what_another_mission_left_is_cleared_where_that_is_asked_for(
+def test_nothing_is_armed_past_the_gate_but_what_an_option_overrules(
     tmp_path: Path, to: str
 ) -> None:
+    """It stands elsewhere, and another mission has left its fence and rally points."""
     mission = written(tmp_path)
-    with vehicle(to, parameters={"FENCE_ENABLE": 0}) as mock:
+    with vehicle(to, home=away(200.0), parameters={"FENCE_ENABLE": 0}) as mock:
         assert upload(a_mission(5, fence=FENCE, rally=RALLY), to).verified
-        assert run("upload", mission, "--to", to).exit_code == 0
-        result = run("fly", mission, "--to", to, "--arm", "--json")
-        assert result.exit_code == 1
-        end = json.loads(result.stdout.splitlines()[-1])
-        assert end["ending"] == "refused"
-        found = {each["rule"]: each["level"] for each in end["findings"]}
-        assert (found["holds-rally"], found["holds-fence"]) == ("error", "warning")
-        assert not mock.armed
-        result = run("upload", mission, "--to", to, "--clear-rest")
-        assert result.exit_code == 0, result.output
-        assert mock.mission() == Mission(mock.mission().items, HOME)
-        assert run("fly", mission, "--to", to, "--arm", "--json").exit_code == 0
-
-
-def test_elsewhere_is_said_aloud(tmp_path: Path, to: str) -> None:
-    mission = written(tmp_path)
-    with vehicle(to, home=away(200.0)) as mock:
         assert run("upload", mission, "--to", to).exit_code == 0
         result = run("fly", mission, "--to", to, "--arm")
         assert result.exit_code == 1
-        assert "error: it stands 200 m from the mission's home, not within 20 m" in result.stdout
-        assert "refused      nothing was started: it stands 200 m" in result.stdout
+        for told in (
+            "refused      nothing was started: it stands 200 m from the mission's home, not within",
+            "warning: it holds a fence (4 items) that the file has not, and does nothing about it",
+            "error: it holds rally points (2 items) that the file has not",
+        ):
+            assert told in result.stdout
         assert not mock.armed
-        result = run("fly", mission, "--to", to, "--arm", "--elsewhere")
+        result = run("upload", mission, "--to", to, "--clear-rest")
         assert result.exit_code == 0, result.output
-        assert "warning: it stands 200 m from the mission's home" in result.stdout
-        assert "--elsewhere: flown all the same" in result.stdout
+        assert mock.mission() == Mission(mock.mission().items, mock.mission().home)
+        result = run("fly", mission, "--to", to, "--arm", "--elsewhere", "--json")
+        assert result.exit_code == 0, result.output
+        end = json.loads(result.stdout.splitlines()[-1])
+        (here,) = (each for each in end["findings"] if each["rule"] == "place-home")
+        assert (here["level"], here["action"]) == ("warning", "--elsewhere: flown all the same")
