@@ -24,7 +24,7 @@ from simulators import simulated
 
 from faao_mav import Result, plan_mission
 from faao_mav.fly.fly import FlightReport, fly_mission
-from faao_mav.fly.seen import Flight
+from faao_mav.fly.preflight import Flight
 from faao_mav.fly.watch import Watch
 from faao_mav.plan import parse_plan
 from faao_mav.sim.faults import Faults, FaultyTransport

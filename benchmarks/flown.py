@@ -33,7 +33,7 @@ from faao_mav import Result, parse_plan, plan_mission
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
 from faao_mav.fly.fly import fly_mission
-from faao_mav.fly.seen import Flight
+from faao_mav.fly.preflight import Flight
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan

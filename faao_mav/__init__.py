@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from faao_mav.errors import SolverError as SolverError
     from faao_mav.fly.fly import fly_mission as fly_mission
     from faao_mav.fly.logs import read_log as read_log
-    from faao_mav.fly.seen import Flight as Flight
+    from faao_mav.fly.preflight import Flight as Flight
     from faao_mav.mission import Mission as Mission
     from faao_mav.mission import MissionItem as MissionItem
     from faao_mav.mission.formats import read_mission as read_mission
@@ -98,7 +98,7 @@ _HOMES = {
     "PlanError SolverError",
     "fly.fly": "fly_mission",
     "fly.logs": "read_log",
-    "fly.seen": "Flight",
+    "fly.preflight": "Flight",
     "mission": "Mission MissionItem",
     "mission.formats": "read_mission render_mission",
     "mission.formats.parameter_file": "read_parameters render_parameters",

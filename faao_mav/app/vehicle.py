@@ -60,7 +60,7 @@ def uploaded(tell: Tell, look: Callable[[], None], result: Result, connection: s
     Nothing is armed or started. `look` raises KeyboardInterrupt to cancel the upload. Raises what
     `upload` raises.
     """
-    from faao_mav.fly.seen import Flight
+    from faao_mav.fly.preflight import Flight
     from faao_mav.wire.client import upload
 
     def observe(what: str, done: int, total: int) -> None:
@@ -87,7 +87,7 @@ def watched(tell: Tell, look: Callable[[], None], result: Result, connection: st
     given what a `Telling` says; `look` raises KeyboardInterrupt to leave the flight.
     """
     from faao_mav.fly.fly import fly_mission
-    from faao_mav.fly.seen import Flight
+    from faao_mav.fly.preflight import Flight
     from faao_mav.fly.telling import Telling
     from faao_mav.fly.watch import Watch
     from faao_mav.report.debrief import flight_lines

@@ -72,7 +72,7 @@ def fly(
     from faao_mav.autopilot.files import made_for
     from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.fly.fly import fly_mission
-    from faao_mav.fly.seen import Flight
+    from faao_mav.fly.preflight import Flight
     from faao_mav.fly.telemetry import POSITION_RATE
     from faao_mav.fly.telling import HEADER, Radios, Telling, as_text
     from faao_mav.report.debrief import flight_lines

@@ -94,7 +94,7 @@ def plan(
     sound = not to_fly or _sound(result)
     uploaded, failure = None, None
     if upload is not None and sound and result.conversion is not None:
-        from faao_mav.fly.seen import Flight
+        from faao_mav.fly.preflight import Flight
 
         flight = Flight.planned(result.conversion, result.solution)
         options = {"system": system, "allow_armed": allow_armed, "made_for": flight.made_for}

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Unpack
 
 from faao_mav.errors import LinkError
-from faao_mav.fly.preflight import Readiness
-from faao_mav.fly.seen import Flight, read_held
+from faao_mav.fly.preflight import Flight, preflight
 from faao_mav.fly.stream import Stream
-from faao_mav.fly.telemetry import POSITION_RATE, Ending
+from faao_mav.fly.telemetry import POSITION_RATE, Ending, read_held
 from faao_mav.fly.watch import Watch
 from faao_mav.validate.flown import FlightRecord
 from faao_mav.validate.rule import Finding
@@ -73,25 +73,19 @@ def fly_mission(
         judged = arm or flight.streamed or not vehicle.armed
         asked = tuple(part for part in MissionType if judged or lists[part])
         held = session.run(read_held(peer, asked, parameters=judged))
-        for part, report in held.missing.items():
-            if lists[part]:
-                raise LinkError(f"{connection}: {session.not_read(report)}")
-        wrong = [
-            each
-            for part in MissionType
-            if lists[part]
-            for each in held.other_than(lists[part], part, peer.vehicle)
-        ]
+        wrong = list[Difference]()
+        for part, sent in lists.items():
+            if sent and part in held.missing:
+                raise LinkError(f"{connection}: {session.not_read(held.missing[part])}")
+            wrong += held.other_than(sent, part, peer.vehicle) if sent else ()
         if wrong:
             return FlightReport(vehicle, tuple(wrong), None, FlightRecord.of(()))
-        allowed = {"elsewhere": elsewhere, "untimed": untimed}
-        ready = Readiness(flight, held, peer, **allowed)
-        rows = held.lists[MissionType.MISSION]
+        gate = partial(preflight, flight, elsewhere=elsewhere, untimed=untimed)
         if flight.streamed and flight.solution is not None:
-            watch: Watch = Stream(peer, flight.solution, ready, rate=rate)
+            watch: Watch = Stream(peer, flight.solution, held, gate, rate=rate)
         else:
-            gate = ready if judged else None
-            watch = Watch(peer, rows, gate, arm=arm, lands=lands, rate=rate)
+            before = gate if judged else None
+            watch = Watch(peer, held, before, arm=arm, lands=lands, rate=rate)
         watch.seen.strangers = session.strangers
         try:
             beats = arm or watch.streams

@@ -1,4 +1,8 @@
-"""A streamed flight from the ground to its end: which setpoint is due where and when."""
+"""A streamed flight from the ground to its end: which setpoint is due, and whether it may be sent.
+
+The `Gate` of all setpoints says where an aircraft can be, and where it may be sent to from there.
+The `Itinerary` asks it about each.
+"""
 
 import math
 from collections.abc import Callable
@@ -8,10 +12,26 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.fly.course import Course, Setpoint, at_rest
-from faao_mav.fly.gate import CLIMB, NEAR, Gate
+from faao_mav.fly.setpoints import Course, Setpoint, at_rest
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan import Plan
 from faao_mav.schedule.transit import way_between, way_home, way_out
+
+NEAR, LEVEL = 2.0, 1.0
+"""Metres across and up within which an aircraft is on course; chosen: a stream that nothing
+disturbs keeps its plan to 0.5 m rms in the simulators."""
+
+CLIMB = 2.0, 1.0
+"""The speed, m/s, and acceleration, m/s², of a climb by setpoints; chosen: below all defaults."""
+
+_AROUND, _QUICKER, _BORNE = 2.0, 2.0, 3.0
+"""A place may be so many metres farther from the last one than the aircraft flies meanwhile at so
+many times the plan's top speed: a failsafe may fly faster than the plan, a wind carry it. Places
+are doubted for so many seconds until they are given up. Chosen."""
+
+_MOVES, _STANDS = 0.5, 1.0
+"""An aircraft that tells at least so many m/s cannot be at the same place for so many seconds, to
+the last digit. Chosen."""
 
 Part: TypeAlias = Literal["take-off", "out", "relay", "back", "over"]
 
@@ -41,6 +61,84 @@ or not, until it is given up; and after which the plan has passed by where it wa
 """
 
 
+class Gate:
+    """The gate of the setpoints for a flight of `plan`: see `believes` and `passes`.
+
+    Times are the vehicle's. `tell` is told when a place is doubted, and believed again.
+    """
+
+    def __init__(self, plan: Plan, tell: Callable[[str], object]) -> None:
+        self._tell = tell
+        self._fence, self._speed = plan.keep_in, plan.max_ground_speed
+        self._acceleration = plan.vehicle.max_acceleration
+        self._on_course: float | None = None
+        self._last: tuple[float, Real] | None = None
+        self._jumped_from: tuple[float, Real] | None = None
+        self._moved = 0.0
+        self._doubted_since = math.inf
+
+    def passes(self, t: float, place: Real, setpoint: Setpoint) -> bool:
+        """Tell whether an aircraft at `place` (3,), m, at `t`, s, may be sent to `setpoint`.
+
+        It may be within `NEAR` and `LEVEL` of it, or off by as much more as it can have fallen
+        behind since it last was; the straight way there has to keep inside the fence.
+        """
+        off = setpoint.position - place
+        across, up = math.hypot(off[0], off[1]), abs(float(off[2]))
+        if self._on_course is None or (across <= NEAR and up <= LEVEL):
+            self._on_course = t
+        since = t - self._on_course
+        far = NEAR + _lag(since, self._speed, self._acceleration)
+        if across > far or up > LEVEL + _lag(since, *CLIMB):
+            return False
+        straight = np.array([place[:2], setpoint.position[:2]])
+        return across <= NEAR or self._fence is None or self._fence.covers_path(straight)
+
+    def believes(self, t: float, place: Real, velocity: Real) -> bool:
+        """Tell whether it can be at `place` (3,), m, with `velocity` (3,), m/s, at `t`, s.
+
+        After a jump it is doubted until it jumps back; so is one that moves and stays where it is.
+        """
+        last, self._last = self._last, (t, place)
+        if last is None or np.linalg.norm(velocity) < _MOVES or (place != last[1]).any():
+            self._moved = t
+        if last is not None and self._jumps(last, t, place):
+            if self._jumped_from is None:
+                self._jumped_from = last
+            elif not self._jumps(self._jumped_from, t, place):
+                self._jumped_from = None
+        stands = t - self._moved >= _STANDS
+        doubted = stands or self._jumped_from is not None
+        if doubted and self._doubted_since == math.inf:
+            self._doubted_since = t
+            why = "does not change, though it moves" if stands else "has jumped"
+            self._tell(f"its place {why}: no setpoints are sent")
+        elif not doubted and self._doubted_since < math.inf:
+            self._doubted_since = math.inf
+            self._tell("its place is believed again")
+        return not doubted
+
+    def has_lost_it(self, t: float) -> bool:
+        """Tell whether its places have been doubted for too long by `t`, s."""
+        return t >= self._doubted_since + _BORNE
+
+    def _jumps(self, before: tuple[float, Real], t: float, place: Real) -> bool:
+        within = _AROUND + _QUICKER * self._speed * (t - before[0])
+        return float(np.linalg.norm(place - before[1])) > within
+
+
+def _lag(seconds: float, speed: float, acceleration: float) -> float:
+    """Return the greatest lag, m, of an aircraft that was on course so many seconds ago.
+
+    One that stays where it is falls behind by at most the speed; one that follows from rest, by
+    the way that it takes to be as fast.
+
+    >>> _lag(0.5, 8.0, 2.0), _lag(60.0, 8.0, 2.0)
+    (4.0, 16.0)
+    """
+    return min(speed * max(seconds, 0.0), speed**2 / (2 * acceleration))
+
+
 class Itinerary:
     """The flight of `solution` in parts, on the vehicle's clock; `tell` is told what happens.
 
@@ -48,7 +146,7 @@ class Itinerary:
     to where the relay flight begins, and a rest there; "relay"; "back" around the fence, until the
     way home is straight; "over". `relay_start` is when the plan's clock reads 0, None before that.
 
-    All but the relay flight waits for the aircraft. One that `gate` does not let follow its part is
+    All but the relay flight waits for the aircraft. One that the `gate` does not let follow it is
     led to it on a way of its own: up or down to the plan's height, and inside the fence to where
     the part ends, or meets the plan, which goes on meanwhile. `trouble` is why it cannot be led,
     None while it can.
@@ -57,10 +155,11 @@ class Itinerary:
     """
 
     def __init__(
-        self, solution: Solution, gate: Gate, tell: Callable[[str], object], *, takes_off: bool
+        self, solution: Solution, tell: Callable[[str], object], *, takes_off: bool
     ) -> None:
         plan = solution.plan
-        self._plan, self._gate, self._tell, self._takes_off = plan, gate, tell, takes_off
+        self._plan, self._tell, self._takes_off = plan, tell, takes_off
+        self.gate = Gate(plan, tell)
         self.relay = Course.of(solution)
         first, last = self.relay.p[[0, -1]]
         if plan.keep_in is not None and not plan.keep_in.covers_path(self.relay.p[:, :2]):
@@ -70,13 +169,14 @@ class Itinerary:
             )
         way_out(plan, first[:2])  # raises
         home = np.vstack([last[:2], way_home(plan, last[:2])])
-        self._ends = {"out": first, "back": np.append(home[-1], plan.flight.altitude)}
+        end = np.append(home[-1], plan.flight.altitude)
+        self._ends: dict[Part, Real] = {"out": first, "back": end, "over": end}
         calm = plan.max_airspeed - plan.site.wind.speed
         self._speed = max(_LEAST, min(plan.vehicle.max_speed, calm))
         self.part: Part = "take-off"
         self.relay_start: float | None = None
         self.trouble: str | None = None
-        self._time = math.nan
+        self._time = math.inf
         self._led, self._meets = False, 0.0
         self._follow(None, 0.0)
 
@@ -85,7 +185,7 @@ class Itinerary:
 
         `velocity` (3,) is in m/s; all are east, north and up of the plan's origin.
         """
-        passed, self._time = 0.0 if math.isnan(self._time) else t - self._time, t
+        passed, self._time = max(t - self._time, 0.0), t
         low = place[2] < self._plan.flight.altitude - _BELOW
         late = self._arrived is not None and t >= self._arrived + _UNSETTLED
         match self.part:
@@ -132,7 +232,7 @@ class Itinerary:
         """
         if self.part == "relay":
             setpoint = self.relay.at(self._plans(t))
-            if self._gate.passes(t, place, setpoint):
+            if self.gate.passes(t, place, setpoint):
                 self._led = False
                 if self._way is not None:
                     self._tell("it is on its plan again")
@@ -141,13 +241,13 @@ class Itinerary:
         way, ahead = self._way, self._gone + passed
         if way is None or (self.part == "relay" and self._plans(t) > self._meets + _MISSED):
             return None
-        if self._gate.passes(t, place, way.at(ahead)):
+        if self.gate.passes(t, place, way.at(ahead)):
             self._gone = ahead
             if ahead >= way.end:
                 self._arrived, self._led = self._arrived or t, False
             return way.at(ahead)
         waiting = at_rest(way.at(self._gone).position)
-        return waiting if t < self._until and self._gate.passes(t, place, waiting) else None
+        return waiting if t < self._until and self.gate.passes(t, place, waiting) else None
 
     def _led_back(self, t: float, place: Real) -> Setpoint | None:
         """Return the beginning of a new way to the present part; None, and why, without one."""
@@ -168,7 +268,7 @@ class Itinerary:
     def _leading(self, t: float, place: Real) -> Course | None:
         """Return a way to the end of the part, or to the plan, that is there no sooner; or None."""
         if self.part != "relay":
-            return self._way_to(place, self._ends["out" if self.part == "out" else "back"])
+            return self._way_to(place, self._ends[self.part])
         now = self._meets = self._plans(t)
         while self._meets < self.relay.end:
             meeting = self.relay.at(self._meets).position

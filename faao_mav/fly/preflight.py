@@ -1,29 +1,26 @@
-"""The gate before a flight: what is to be flown against what is held and seen of the vehicle.
+"""What is to be flown, and the gate before it: against what is held and seen of the vehicle.
 
-Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints. A
-`Readiness` is that of one flight while its vehicle is watched.
+Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints.
 """
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.autopilot.files import addressee_mistake
+from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.autopilot.manners import FenceAction
-from faao_mav.fly.seen import Flight, Held, read_held
-from faao_mav.fly.telemetry import Telemetry
+from faao_mav.fly.telemetry import Held, Telemetry
+from faao_mav.mission.item import Home, Mission
 from faao_mav.validate import Limits
 from faao_mav.validate.check import Check, check, predicted
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.speeds import beyond_lean
 from faao_mav.validate.words import counted
-from faao_mav.wire.machine import Script
-from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.parameters import number_in
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.transfer import Peer
 from faao_mav.wire.whereabouts import (
     FIRST_AWAY,
     FIRST_FARTHEST,
@@ -35,13 +32,13 @@ from faao_mav.wire.whereabouts import (
 )
 from faao_mav.wire.wire_items import wire_items
 
+if TYPE_CHECKING:
+    from faao_mav.optimizer.solution import Solution
+    from faao_mav.schedule.conversion import Conversion
+
 LEAST_BATTERY = 30
 """Percent of the battery with which a flight begins at least, where nothing tells what it takes.
 Chosen: twice what PX4 takes for low by default."""
-
-_LOOK = 5.0
-"""Seconds after which it is told what stands against a flight, though its place is not known.
-Chosen."""
 
 _AT_FENCE: dict[FenceAction, str] = {
     "nothing": "flies on",
@@ -57,6 +54,45 @@ _TABLE = {
     for level, name, says, do in rows_of(files("faao_mav.fly").joinpath("preflight.tsv"))
 }
 """What stands against a flight, or is worth knowing before it, by the ids of the findings."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flight:
+    """What is to be flown: `mission`, or, `streamed`, the plan of `solution` by setpoints.
+
+    `vehicle` has the parameters that the mission is timed for, whose `source` says where they come
+    from; `made_for` says what is known of whom it was made for. A `solution` tells what the flight
+    is to deliver, and may tell what it takes of the battery.
+
+    >>> from faao_mav import Vehicle, read_mission
+    >>> flight = Flight(read_mission("tests/data/missions/plain.waypoints"), Vehicle())
+    >>> flight.streamed, flight.solution
+    (False, None)
+    """
+
+    mission: Mission
+    vehicle: Vehicle = field(default_factory=Vehicle)
+    made_for: MadeFor = field(default_factory=MadeFor)
+    solution: "Solution | None" = None
+    streamed: bool = False
+
+    @classmethod
+    def planned(
+        cls, conversion: "Conversion", solution: "Solution", *, streamed: bool = False
+    ) -> "Flight":
+        """Return the flight of the mission that `solution` was made into."""
+        vehicle = conversion.vehicle
+        made_for = MadeFor(vehicle.autopilot, vehicle.kind, "as the plan says")
+        return cls(conversion.mission, vehicle, made_for, solution, streamed)
+
+    @property
+    def placed(self) -> Mission:
+        """The mission with the home that its flight counts from: of a stream, its plan's."""
+        if not self.streamed or self.solution is None:
+            return self.mission
+        origin = self.solution.plan.origin
+        home = Home(origin.latitude, origin.longitude, origin.elevation)
+        return replace(self.mission, home=home)
 
 
 def preflight(
@@ -237,82 +273,20 @@ def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Ite
         else:
             row = "loss-acts" if told.acts else "loss-idle"
             yield _found(row, rule=rule, loss=loss, does=told.text)
-    if flight.streamed and flight.solution is not None:
-        lean = beyond_lean(flight.solution, own)
-        yield from [_found("lean", told=lean)] if lean is not None else []
-    if flight.streamed and (refusal := rules.refusal(values)) is not None:
-        yield _found("on-setpoints-lost", does=refusal[0], instead=refusal[1])
-    elif flight.streamed:
-        does = f"setpoints lost: {rules.without(values)}"
-        yield _found("on-setpoints-lost", Level.NOTE, does=does, instead="")
+    if flight.streamed:
+        lean = None if flight.solution is None else beyond_lean(flight.solution, own)
+        if lean is not None:
+            yield _found("lean", told=lean)
+        refusal = rules.refusal(values)
+        does, instead = refusal or (f"setpoints lost: {rules.without(values)}", "")
+        level = Level.ERROR if refusal else Level.NOTE
+        yield _found("on-setpoints-lost", level, does=does, instead=instead)
     if held.rows(MissionType.FENCE, seen.vehicle):
         response = own.type.at_fence(own)
         does, name = _AT_FENCE[response.action], own.name_of(response.parameter)
-        level, instead = Level.WARNING, f"set {name} {response.set_to}"
-        if response.keeps:
-            level, instead = Level.NOTE, ""
+        instead = "" if response.keeps else f"set {name} {response.set_to}"
+        level = Level.NOTE if response.keeps else Level.WARNING
         yield _found("on-fence-left", level, does=does, name=name, instead=instead)
     height = own.vertical.return_height
     if height > 0 and "return_height" in own.type.parameters:
         yield _found("on-return", height=height, name=own.name_of("return_height"))
-
-
-class Readiness:
-    """The gate of `flight` by the vehicle of `peer`, of which `held` was read just before.
-
-    For what is `allowed` see `preflight`. `findings` is what it found last, None before. `judge`
-    looks now and then; before it is armed `settle` reads it again, while `on` is given what
-    arrives.
-    """
-
-    def __init__(self, flight: Flight, held: Held, peer: Peer, **allowed: bool) -> None:
-        self._flight, self._held, self._peer = flight, held, peer
-        self._allowed = allowed
-        self.findings: tuple[Finding, ...] | None = None
-        self._judged: tuple[object, ...] = ()
-        self._reading: Script[Held] | None = None
-
-    @property
-    def errors(self) -> tuple[Finding, ...]:
-        """Those of `findings` for which nothing is armed."""
-        return tuple(each for each in self.findings or () if each.level is Level.ERROR)
-
-    @property
-    def values(self) -> dict[str, float]:
-        """The vehicle's parameters that a flight depends on, by name."""
-        return self._held.reading.values
-
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        """Take note of what the vehicle says, and answer it."""
-        return () if self._reading is None else self._reading.on(envelope, now)
-
-    def judge(self, seen: Telemetry, now: float, *, again: bool = False) -> None:
-        """Judge what is heard, once enough is, and `again` or when that is another state."""
-        known = seen.place is not None and seen.status is not None
-        if seen.heartbeat is None or not (known or now >= seen.begun + _LOOK):
-            return
-        others = len(seen.stations), len(seen.strangers)
-        state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
-        if again or state != self._judged:
-            self._judged = state
-            self.findings = preflight(self._flight, self._held, seen, **self._allowed)
-
-    def settle(self, seen: Telemetry, now: float) -> Sequence[Message] | None:
-        """Return what is to be sent until the gate is up to date; None: `findings` is.
-
-        What it holds is read again; without fresh news of the vehicle it waits.
-        """
-        if self._reading is None:
-            self._reading = Script(read_held(self._peer))
-            return self._reading.start(now)
-        if self._reading.outcome is None:
-            return self._reading.tick(now)
-        if not seen.is_fresh(now):
-            return ()
-        self._held = self._reading.outcome
-        self.judge(seen, now, again=True)
-        return None
-
-    def cancel(self, now: float) -> Sequence[Message]:
-        """Read no more."""
-        return () if self._reading is None else self._reading.cancel(now)

@@ -1,19 +1,15 @@
 """Flying a plan by setpoints: the trajectory itself, not way points along it."""
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.fly.course import Setpoint, at_rest
-from faao_mav.fly.gate import LEVEL, Gate
-from faao_mav.fly.itinerary import Itinerary
-from faao_mav.fly.own import OwnClock, OwnFrame
-from faao_mav.fly.preflight import Readiness
-from faao_mav.fly.telemetry import PATIENCE
-from faao_mav.fly.watch import ACCEPTED, Order, Watch
+from faao_mav.fly.itinerary import LEVEL, Itinerary
+from faao_mav.fly.setpoints import OwnClock, OwnFrame, Setpoint, at_rest
+from faao_mav.fly.telemetry import PATIENCE, Held
+from faao_mav.fly.watch import ACCEPTED, Order, Preflight, Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.wire.messages import (
     CommandLong,
@@ -65,31 +61,29 @@ class Stream(Watch):
         self,
         peer: Peer,
         solution: Solution,
-        readiness: Readiness,
+        held: Held,
+        preflight: Preflight,
         *,
         rate: float = 10.0,
     ) -> None:
         plan, finish = solution.plan, solution.plan.mission.on_finish
-        super().__init__(peer, (), readiness, arm=True, lands=finish != "hover", rate=rate)
+        super().__init__(peer, held, preflight, arm=True, lands=finish != "hover", rate=rate)
         if self._modes.guided is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._flown, self._rules = self._modes.guided, self._family.setpoints
-        engage = MavCommand.SET_MODE, self._family.mode_parameters(self._flown)
-        self._starts = {"engaging": engage, "arming": (MavCommand.ARM, (1.0,))}
+        self._height, self._top = plan.flight.altitude, plan.max_ground_speed
+        engage = self._family.mode_parameters(self._flown)
+        self._left = [("engaging", MavCommand.SET_MODE, engage), ("arming", MavCommand.ARM, (1.0,))]
         self._by_setpoints = self._rules.takes_off_by_setpoints
         if not self._by_setpoints:
-            take_off = MavCommand.TAKEOFF, (*[0.0] * 6, plan.flight.altitude)
-            self._starts["starting"] = take_off
+            self._left.append(("starting", MavCommand.TAKEOFF, (*[0.0] * 6, self._height)))
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if self._lands else "hold"]
-        self._readiness = readiness
-        self._height, self._top = plan.flight.altitude, plan.max_ground_speed
         self._period = 1 / rate
-        self._held = 0.0 if self._rules.carries_on else self._period / 2
+        self._ahead = 0.0 if self._rules.carries_on else self._period / 2
         tell = self.seen.told.append
-        self._clock, self._gate = OwnClock(), Gate(plan, tell)
-        self.flight = Itinerary(solution, self._gate, tell, takes_off=not self._by_setpoints)
-        self._frame = OwnFrame(self._family, plan.origin)
+        self.flight = Itinerary(solution, tell, takes_off=not self._by_setpoints)
+        self._clock, self._frame = OwnClock(), OwnFrame(self._family, plan.origin)
         self._home_told = False
         self._unsure_since: float | None = None
         """Since when it is not known who flies it: then nothing that moves it is sent."""
@@ -98,33 +92,33 @@ class Stream(Watch):
         if self._rules.loss:
             self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
 
-    def _hear(self, message: Message, now: float) -> Sequence[Message]:
+    def _hear(self, message: Message, now: float) -> None:
         in_flight = self.phase in ("flying", "ending", "holding")
         if in_flight and now > self._heard_at + self._without_setpoints:
             self._unsure_since, self.seen.wanted = now, None  # it may be in another mode since
         self._heard_at = now
-        out = super()._hear(message, now)
+        super()._hear(message, now)
         match message:
             case GpsGlobalOrigin():
                 self._frame.origin = message
             case Timesync():
                 self._clock.hear(message, now)
             case CurrentMode(custom_mode=mode) if in_flight:
-                out = [*out, *self._on_mode(mode, now)]
+                self._on_mode(mode, now)
             case GlobalPositionInt() if self.outcome is None and message is self.seen.position:
-                out = [*out, *self._on_position(message, now)]
-        return out
+                self._on_position(message, now)
 
-    def _time_out(self, now: float) -> Sequence[Message]:
-        out = super()._time_out(now)
+    def _look(self, now: float) -> None:
+        super()._look(now)
         if self.outcome is not None or self.phase in ("holding", "aside"):
-            return out
+            return
         if self.phase == "flying" and now >= self._sent_by:
-            return [*out, *self._give_up("for too long no setpoint could be sent", now)]
+            self._give_up("for too long no setpoint could be sent", now)
+            return
         if self.phase == "checking" and self._frame.origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
-            out = [*out, CommandLong(self._peer.address, *ask)]
-        return [*out, self._clock.ask(now)]
+            self._out.append(CommandLong(self._peer.address, *ask))
+        self._out.append(self._clock.ask(now))
 
     def _lacks(self, now: float) -> str:
         if self._frame.origin is None or not self.seen.fixes:
@@ -135,10 +129,10 @@ class Stream(Watch):
 
     # ---- who flies it
 
-    def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
+    def _answered(self, order: Order, result: int, now: float) -> None:
         if self.phase == "starting" and result == ACCEPTED:
             self._begin()
-        return super()._answered(order, result, now)
+        super()._answered(order, result, now)
 
     def _begin(self) -> None:
         super()._begin()
@@ -148,17 +142,16 @@ class Stream(Watch):
         climb = 0.0 if self._by_setpoints else self._height / _SLOW_CLIMB
         self._sent_by = self._heard_at + PATIENCE + climb
 
-    def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
+    def _on_mode(self, mode: int, now: float) -> None:
         if mode in self._path:
             self._unsure_since = None
         super()._on_mode(mode, now)
         if self.phase == "engaging" and mode == self._flown:
-            return self._go_on(now)
-        if self.phase == "ending" and mode == self._finish:
+            self._go_on(now)
+        elif self.phase == "ending" and mode == self._finish:
             self._order = None
             if not self._lands:
                 self._over()
-        return ()
 
     def _on_another_mode(self, mode: int, now: float) -> None:
         """Step aside for somebody else; its failsafe for lost setpoints is told.
@@ -168,7 +161,7 @@ class Stream(Watch):
         """
         led = self.phase in ("flying", "ending") or (self.phase == "holding" and self._order)
         wanted, since = self.seen.wanted, self._unsure_since
-        by_itself = led and self._rules.comes_back_from(mode, self._readiness.values)
+        by_itself = led and self._rules.comes_back_from(mode, self._held.reading.values)
         if by_itself and wanted is None and (since is None or now <= since + _TOLD_BY):
             self._unsure_since = since or now
             return
@@ -179,60 +172,59 @@ class Stream(Watch):
         elif self._armed or self.phase != "ending":
             self._step_aside()
 
-    def _repeat(self, now: float) -> Sequence[Message]:
+    def _repeat(self, now: float) -> None:
         """Give the order; that to follow setpoints once these have come for long enough."""
         waits = self.phase == "engaging" and self._by_setpoints
         streamed = self._last_sent >= self._first_sent + _STREAMED * self._rules.streamed
-        unsure = self._unsure_since is not None or (waits and not streamed)
-        return () if unsure else super()._repeat(now)
+        if self._unsure_since is None and (streamed or not waits):
+            super()._repeat(now)
 
-    def _give_up(self, why: str, now: float) -> Sequence[Message]:
+    def _give_up(self, why: str, now: float) -> None:
         """End the setpoints of an aircraft that cannot be led on: it is to hold."""
         self.seen.told.append(f"setpoints end: {why}")
         if self.seen.custom_mode == self._flown:
-            return self._ask_to_hold(now)
-        self._step_aside()
-        return ()
+            self._ask_to_hold(now)
+        else:
+            self._step_aside()
 
     # ---- where it is to be
 
-    def _on_position(self, position: GlobalPositionInt, now: float) -> Sequence[Message]:
+    def _on_position(self, position: GlobalPositionInt, now: float) -> None:
         t, place = position.time_boot_ms / 1000, self._frame.place(position)
         velocity = np.array([position.vy, position.vx, -position.vz]) / 100
         if self._clock.age(t, now) > _OLD:
-            return ()
+            return
         if self.phase == "starting" and place[2] > _OFF_GROUND:
             self._begin()
-        under_way, gate = self.phase in ("flying", "ending"), self._gate
-        believed = not under_way or gate.believes(t, place, velocity)
-        setpoint = self._setpoint(t, place, velocity) if believed else None
-        if under_way and (gate.has_lost_it(t) or self.flight.trouble is not None):
-            lost = "where it is, is not known"
-            return self._give_up(lost if gate.has_lost_it(t) else str(self.flight.trouble), now)
-        if not believed:
-            return ()
+        under_way, gate = self.phase in ("flying", "ending"), self.flight.gate
+        if under_way and not gate.believes(t, place, velocity):
+            if gate.has_lost_it(t):
+                self._give_up("where it is, is not known", now)
+            return
+        setpoint = self._setpoint(t, place, velocity)
+        if under_way and self.flight.trouble is not None:
+            self._give_up(self.flight.trouble, now)
+            return
         risen = self._frame.risen(position)
         if abs(risen) > LEVEL and not self._home_told:
             self._home_told = True
             what = f"home is {risen:+.0f} m higher now"
             self.seen.told.append(f"{what}: setpoints keep to that of the departure")
-        out = list[Message]()
         over = self.flight.part == "over" and self.seen.custom_mode == self._flown
         if self.phase == "flying" and over:
             self.phase, self._path = "ending", (self._flown, self._finish)
-            out += self._set_mode(now, self._finish)
+            self._set_mode(now, self._finish)
         if self.phase == "engaging":
-            out += self._repeat(now)
+            self._repeat(now)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent, self._sent_by = t, now + PATIENCE
             self._first_sent = min(self._first_sent, t)
-            out.append(self._frame.message(setpoint, position, self._peer.address))
-        return out
+            self._out.append(self._frame.message(setpoint, position, self._peer.address))
 
     @property
     def _without_setpoints(self) -> float:
         """For how many of the world's seconds it keeps its mode without setpoints."""
-        kept = {**self._rules.defaults, **self._readiness.values}[self._rules.timeout]
+        kept = {**self._rules.defaults, **self._held.reading.values}[self._rules.timeout]
         return kept / max(self._clock.speed, 1.0)
 
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
@@ -241,7 +233,7 @@ class Stream(Watch):
         if self.phase == "flying" or (asked and self.seen.custom_mode == self._flown):
             if self._unsure_since is not None:
                 return None
-            lead = self._held + self._clock.lead
+            lead = self._ahead + self._clock.lead
             speed = max(float(np.linalg.norm(velocity)), self._top)
             by_then = place + lead * velocity * (self._top / speed)
             setpoint = self.flight.setpoint(t + lead, by_then, velocity)

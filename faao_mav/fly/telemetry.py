@@ -1,11 +1,15 @@
-"""What a vehicle tells of its flight, and asking it for what it does not tell by itself."""
+"""What is held and seen of a vehicle: its lists and parameters, and what it tells of its flight."""
 
-from collections.abc import Sequence, Set
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
-from faao_mav.mission.item import Home
+from faao_mav.autopilot import VehicleType
+from faao_mav.errors import InputError
+from faao_mav.mission.item import Home, Mission
 from faao_mav.validate.flown import Fix, FlightRecord
+from faao_mav.wire.jobs import download_lists
+from faao_mav.wire.machine import Talk
 from faao_mav.wire.messages import (
     BatteryStatus,
     CommandLong,
@@ -13,6 +17,7 @@ from faao_mav.wire.messages import (
     Envelope,
     GlobalPositionInt,
     Heartbeat,
+    HomePosition,
     LocalPositionNed,
     Message,
     MissionCurrent,
@@ -22,10 +27,12 @@ from faao_mav.wire.messages import (
     SysStatus,
     WireItem,
 )
+from faao_mav.wire.parameters import Reading, read_parameters
 from faao_mav.wire.protocol import (
     CURRENT_ITEM,
     CURRENT_MODE,
     GROUND_STATION_TYPE,
+    HOME_POSITION,
     LOCAL_POSITION,
     POSITION,
     SYSTEM_STATUS,
@@ -33,10 +40,11 @@ from faao_mav.wire.protocol import (
     MavSeverity,
     MissionType,
 )
-from faao_mav.wire.transfer import Peer
-from faao_mav.wire.verify import compare
-from faao_mav.wire.whereabouts import place_in
-from faao_mav.wire.wire_items import home_items
+from faao_mav.wire.questions import ask_for
+from faao_mav.wire.transfer import PartReport, Peer
+from faao_mav.wire.verify import Difference, compare
+from faao_mav.wire.whereabouts import home_in, place_in
+from faao_mav.wire.wire_items import home_items, mission_of
 
 Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
@@ -65,6 +73,67 @@ _PROPULSION = (0, 1, 2)
 
 _BACK = 2000
 """Milliseconds by which a vehicle's clock goes back when it has rebooted; less is a late packet."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Held:
+    """What a vehicle holds: `lists` as downloaded, its home row included, `reading` of parameters.
+
+    `missing` says why a list is not there; `home` is where it returns to, None where that is not
+    known.
+    """
+
+    lists: Mapping[MissionType, tuple[WireItem, ...]]
+    reading: Reading
+    missing: Mapping[MissionType, PartReport] = field(default_factory=dict)
+    home: Home | None = None
+
+    def rows(self, part: MissionType, vehicle: VehicleType) -> tuple[WireItem, ...]:
+        """Return the items of one list, without the home row; none where it was not read."""
+        return tuple(self.lists.get(part, ()))[home_items(vehicle, part) :]
+
+    def other_than(
+        self, sent: Sequence[WireItem], part: MissionType, vehicle: VehicleType
+    ) -> tuple[Difference, ...]:
+        """Return where one list is not `sent`, home included, but for what storage loses."""
+        found = compare(sent, self.lists.get(part, ()), part, vehicle)
+        return tuple(each for each in found if each.kind == "wrong")
+
+    def beside(self, mission: Mission, vehicle: VehicleType) -> Mission:
+        """Return `mission` with the fence and the rally points that are held."""
+        try:
+            held = mission_of(self.lists, vehicle)
+        except InputError:  # told as another list than the file's
+            return mission
+        return replace(mission, fence=held.fence, rally=held.rally)
+
+
+def read_held(
+    peer: Peer,
+    parts: Sequence[MissionType] = tuple(MissionType),
+    *,
+    parameters: bool = True,
+) -> Talk["Held"]:
+    """Read what the vehicle of `peer`, which has to be one that is known, holds.
+
+    That are the lists `parts`, and with `parameters` these and its home.
+    """
+    vehicle = peer.vehicle
+    assert vehicle is not None
+    lists = yield from download_lists(parts, peer)
+    if MissionType.MISSION in lists.missing or not parameters:
+        return Held(lists.items, Reading({}), lists.missing)
+    names = [tuple(each.names) for each in vehicle.parameters.values()]
+    names += [(name,) for each in vehicle.failsafes for name in each.defaults]
+    if vehicle.modes.guided is not None:
+        names += [(name,) for name in vehicle.family.setpoints.defaults]
+    reading = yield from read_parameters(peer, names)
+    told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
+    try:
+        home = None if told is None else home_in(told)
+    except InputError:
+        home = None
+    return Held(lists.items, reading, lists.missing, home)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,14 +1,13 @@
 """Watching a flight from the ground to its end; arming and starting it, where that is asked for."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from faao_mav.fly.preflight import Readiness
-from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
-from faao_mav.validate.rule import Finding
-from faao_mav.wire.machine import Machine, Progress
+from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Held, Kind, Telemetry, read_held
+from faao_mav.validate.rule import Finding, Level
+from faao_mav.wire.machine import Machine, Progress, Script
 from faao_mav.wire.messages import (
     CommandAck,
     CommandLong,
@@ -16,15 +15,23 @@ from faao_mav.wire.messages import (
     Heartbeat,
     Message,
     MissionCurrent,
-    WireItem,
 )
-from faao_mav.wire.protocol import LOCAL_POSITION, MISSION_COMPLETE, MavCommand, command_result
+from faao_mav.wire.protocol import (
+    LOCAL_POSITION,
+    MISSION_COMPLETE,
+    MavCommand,
+    MissionType,
+    command_result,
+)
 from faao_mav.wire.transfer import Peer
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",
     "ending", "aside",
 ]  # fmt: skip
+
+Preflight: TypeAlias = Callable[[Held, Telemetry], tuple[Finding, ...]]
+"""The gate before a flight: what stands against it, by what is held and seen of the vehicle."""
 
 _AGAIN, TRIES = 1.5, 5
 """Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
@@ -44,11 +51,15 @@ was the mission that changed it. Chosen: three of the messages that tell the ite
 _FIRST_DO = 176
 """From this command on an item is no place to fly to or to wait at."""
 
-_LISTEN = 2.0
-"""Seconds of listening for other ground stations before anything is started: two heartbeats."""
+_LISTEN, _LOOK = 2.0, 5.0
+"""Seconds of listening for other ground stations before anything is started: two heartbeats; and
+after which it is told what stands against a flight, though its place is not known. Chosen."""
 
 _WORDS = 1.0
 """Seconds for which what the vehicle says of an arming that it denies is waited for; chosen."""
+
+BEFORE = "waiting", "checking", "engaging", "arming", "starting"
+"""The phases before the flight, whose orders are given up after some tries."""
 
 
 @dataclass(slots=True)
@@ -67,15 +78,16 @@ class Order:
 
 
 class Watch(Machine[Ending]):
-    """A machine that watches the vehicle of `peer` fly the mission `rows` to its end.
+    """A machine that watches the vehicle of `peer` fly the mission that it `held` to its end.
 
-    `rows` are the items that it holds, the home row included where it has one. `lands`: the flight
-    ends on the ground. After `PATIENCE` seconds without a message it ends. `seen` is what it has
-    heard; it asks for `rate` positions a second. What stands against the flight `readiness`, the
-    gate before it, says until it begins; a flight that begins elsewhere may be without.
+    `lands`: the flight ends on the ground. After `PATIENCE` seconds without a message it ends.
+    `seen` is what it has heard; it asks for `rate` positions a second. `findings` is what stands
+    against the flight: what `preflight`, the gate before it, has found last until it begins, None
+    before it has looked; a flight that begins elsewhere may be without.
 
     With `arm` it arms the vehicle and starts the mission: once the autopilot's own checks pass, it
-    knows where it is, no other ground station was heard and the gate finds no error. After
+    knows where it is, no other ground station was heard, what it holds has been read again and the
+    gate finds no error. After
     `PATIENCE` seconds of checks that do not pass it ends. Nothing is ever sent again, but what asks
     for telemetry, once the mode is one that was not asked for: then the pilot, or a failsafe, has
     the aircraft. Without `arm` nothing else is sent at all.
@@ -85,7 +97,7 @@ class Watch(Machine[Ending]):
     leaves a mission to the autopilot. What was armed, and did not start, is asked to disarm until
     it has.
 
-    The phases: "waiting" for others to start it, or "checking", then those of its table of orders,
+    The phases: "waiting" for others to start it, or "checking", then those of its orders,
     "engaging" (a `Stream` only), "arming" and "starting", or "disarming"; "flying"; "ending", when
     the mission is over; "holding", as `cancel` asked for; "aside", when somebody else has the
     aircraft. In each the vehicle's mode is one of `_path`, which it goes along: any other was set
@@ -95,11 +107,13 @@ class Watch(Machine[Ending]):
     streams = False
     """Whether it is not the mission that is flown, but a plan by setpoints."""
 
+    progress: Progress = ("watching", 0, 0)
+
     def __init__(
         self,
         peer: Peer,
-        rows: Sequence[WireItem],
-        readiness: Readiness | None = None,
+        held: Held,
+        preflight: Preflight | None,
         *,
         arm: bool = False,
         lands: bool = True,
@@ -107,41 +121,36 @@ class Watch(Machine[Ending]):
     ) -> None:
         super().__init__()
         assert peer.vehicle is not None
+        assert preflight is not None or not arm
         self._peer, self._modes, self._family = peer, peer.vehicle.modes, peer.vehicle.family
+        rows = () if self.streams else held.lists[MissionType.MISSION]
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
-        self._arms, self._lands, self._ready = arm, lands, readiness
+        self._arms, self._lands, self._held, self._preflight = arm, lands, held, preflight
+        self.findings: tuple[Finding, ...] | None = None
+        self._judged: tuple[object, ...] = ()
+        self._reading: Script[Held] | None = None
         self.seen = Telemetry(peer, rows, rate)
-        self.phase: Phase = "waiting"
         if arm:
             self.seen.ask_for(LOCAL_POSITION, 1.0)
-            self.phase = "checking"
+        self.phase: Phase = "checking" if arm else "waiting"
         self.relay_start: float | None = None
         """When the plan's clock read 0, s on the vehicle's, where that is known."""
         self._flown = self._modes.mission
         """The mode that flies it."""
-        self._starts: dict[Phase, tuple[MavCommand, tuple[float, ...]]] = {
-            "arming": (MavCommand.ARM, (1.0,)),
-            "starting": (MavCommand.START, ()),
-        }
-        """The orders that start it, one after the other."""
+        self._left: list[tuple[Phase, MavCommand, tuple[float, ...]]] = [
+            ("arming", MavCommand.ARM, (1.0,)),
+            ("starting", MavCommand.START, ()),
+        ]
+        """The orders that are left to start it, one after the other."""
         self._order: Order | None = None
         self._path: tuple[int, ...] = ()
         """The modes of this phase, in the order in which they come; none: any."""
         self._furthest, self._armed, self._unattended = 0, False, False
         self._aside_since, self._disarmed_at = -math.inf, math.inf
-        self._said_before = 0
         self._then = Ending("refused", "")
-
-    @property
-    def findings(self) -> tuple[Finding, ...] | None:
-        """What the gate before the flight found, None before it has looked."""
-        return None if self._ready is None else self._ready.findings
-
-    @property
-    def progress(self) -> Progress:
-        """What is going on, at which item of how many."""
-        return f"watching ({self.phase})", self.seen.row or 0, self.seen.items
+        self._out: list[Message] = []
+        """What is said once the present call returns."""
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen, and ask for telemetry."""
@@ -153,15 +162,18 @@ class Watch(Machine[Ending]):
         asked = self._order is not None
         begun = self._arms and self.phase in ("starting", "flying")
         if begun or (self.phase == "ending" and asked):
-            return self._ask_to_hold(now)
-        if self.phase == "arming":
-            return self._disarm(Ending("left", "interrupted before the start"), now)
-        if self.phase == "disarming":
+            self._ask_to_hold(now)
+        elif self.phase == "arming":
+            self._disarm(Ending("left", "interrupted before the start"), now)
+        elif self.phase == "disarming":
             self._leave_armed("interrupted again")
-        armed = "armed" if self._armed else "not armed"
-        doubt = ", and has not confirmed that it holds" if self.phase == "holding" and asked else ""
-        self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}{doubt}")
-        return () if self._ready is None else self._ready.cancel(now)
+        else:
+            armed = "armed" if self._armed else "not armed"
+            holds = self.phase != "holding" or not asked
+            doubt = "" if holds else ", and has not confirmed that it holds"
+            self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}{doubt}")
+            self._out += () if self._reading is None else self._reading.cancel(now)
+        return self._said()
 
     def hang_up(self, now: float) -> Sequence[Message]:
         """Leave a mission that is under way to the autopilot, cancel anything else.
@@ -178,19 +190,28 @@ class Watch(Machine[Ending]):
 
     def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
         self.seen.hear(envelope, now)
-        out = [*self._end_as_heard(now)]
+        self._end_as_heard(now)
         if envelope.sender == self._peer.address and self.outcome is None:
-            out += () if self._ready is None else self._ready.on(envelope, now)
-            out += self._hear(envelope.message, now)
-        return out
+            self._out += () if self._reading is None else self._reading.on(envelope, now)
+            self._hear(envelope.message, now)
+        return self._said()
 
-    def _hear(self, message: Message, now: float) -> Sequence[Message]:
+    def _time_out(self, now: float) -> Sequence[Message]:
+        self._due = now + _TICK
+        self._look(now)
+        return self._said()
+
+    def _said(self) -> list[Message]:
+        said, self._out = self._out, []
+        return said
+
+    def _hear(self, message: Message, now: float) -> None:
         """Take note of what the vehicle tells."""
         order = self._order
         match message:
             case CommandAck(target, command, result) if self._peer.own.takes(target):
                 if order is not None and command == order.command and result != _IN_PROGRESS:
-                    return self._answered(order, result, now)
+                    self._answered(order, result, now)
             case Heartbeat(armed=armed, custom_mode=mode):
                 # A first heartbeat may be from before the order.
                 told = self._armed or (order is not None and order.sent > 1)
@@ -199,14 +220,14 @@ class Watch(Machine[Ending]):
                 if self._armed != armed:
                     self._disarmed_at = math.inf if armed else now
                 self._armed = armed
-                return self._on_mode(mode, now)
+                self._on_mode(mode, now)
             case MissionCurrent() if not self.streams:
                 self._on_current(message, now)
-        return ()
 
-    def _time_out(self, now: float) -> Sequence[Message]:
-        self._due = now + _TICK
-        out = [*self.seen.tick(now), *self._end_as_heard(now)]
+    def _look(self, now: float) -> None:
+        """Do what is due."""
+        self._out += self.seen.tick(now)
+        self._end_as_heard(now)
         if now >= self._disarmed_at + _REBOOT:
             self._disarmed_at = math.inf
             self._on_disarmed()
@@ -214,10 +235,13 @@ class Watch(Machine[Ending]):
         if self._unattended and over:
             self._end("left", f"the terminal has gone; the vehicle is in mode {self.seen.mode}")
         if self.outcome is not None:
-            return out
-        if self._ready is not None and self.phase == "waiting" and not self._armed:
-            self._ready.judge(self.seen, now)
-        return [*out, *(self._check(now) if self.phase == "checking" else self._repeat(now))]
+            return
+        if self.phase == "checking" or (self.phase == "waiting" and not self._armed):
+            self._judge(now)
+        if self.phase == "checking":
+            self._check(now)
+        else:
+            self._repeat(now)
 
     # ---- what the vehicle does
 
@@ -232,7 +256,7 @@ class Watch(Machine[Ending]):
         if current.mission_state == MISSION_COMPLETE and self.phase == "flying":
             self._over()
 
-    def _on_mode(self, mode: int, now: float) -> Sequence[Message]:
+    def _on_mode(self, mode: int, now: float) -> None:
         if self._path and mode not in self._path:
             self._on_another_mode(mode, now)
         elif self._path:
@@ -245,7 +269,6 @@ class Watch(Machine[Ending]):
             case "holding" if self._path == (mode,) and self._order is not None:
                 self._order, self.seen.patience = None, PATIENCE
                 self.seen.told.append("it holds; interrupt again to leave it")
-        return ()
 
     def _on_another_mode(self, mode: int, now: float) -> None:  # noqa: ARG002
         """Step aside for who set that; the last item has a mode of its own, as PX4's return."""
@@ -256,7 +279,7 @@ class Watch(Machine[Ending]):
             self._aside_since = now
         self._step_aside()
 
-    def _answered(self, order: Order, result: int, now: float) -> Sequence[Message]:
+    def _answered(self, order: Order, result: int, now: float) -> None:
         """Go on, or end, now that an order is answered.
 
         Arming that is denied is not asked for again, but for setpoints, whose mode may need what
@@ -267,16 +290,15 @@ class Watch(Machine[Ending]):
         order.refusals += not accepted
         match self.phase:
             case "arming" if accepted:
-                return self._go_on(now)
+                self._go_on(now)
             case "arming" if self.streams and now < self.seen.begun + PATIENCE:
                 order.sent = 0
             case "arming":
                 order.sent, order.due = TRIES, now + _WORDS
             case "starting" if not accepted:
-                return self._refused(order, now)
+                self._refused(order, now)
             case "disarming" if order.refusals == TRIES:
                 self._leave_armed(f"it {order.answer}")
-        return ()
 
     def _begin(self) -> None:
         self.phase, self._order, self._path = "flying", None, (self._flown,)
@@ -313,129 +335,136 @@ class Watch(Machine[Ending]):
 
     # ---- what it is told
 
-    def _check(self, now: float) -> Sequence[Message]:
-        """Arm, if there is nothing against it."""
-        seen, ready, waited = self.seen, self._ready, now - self.seen.begun
-        assert ready is not None
-        ready.judge(seen, now)
-        if self._stopped(ready):
-            return ()
-        lacks = self._lacks(now)
+    def _check(self, now: float) -> None:
+        """Arm, if there is nothing against it, also by what it holds now and by fresh news."""
+        seen, lacks, waited = self.seen, self._lacks(now), now - self.seen.begun
+        self._passes()
         if waited >= PATIENCE:
             said = "; ".join(dict.fromkeys(seen.said)) or lacks or "it does not say why"
             self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
-            return ()
         may_arm = seen.status is not None and seen.status.may_arm and seen.current is not None
-        if waited < _LISTEN or lacks or not may_arm:
-            return ()
-        out = ready.settle(seen, now)
-        if out is not None:
-            return out
-        if self._stopped(ready) or ready.errors:
-            return ()
-        orders = f"arming, and starting {seen.items} items"
-        orders = "it is set to follow setpoints, then armed" if self.streams else orders
-        seen.told.append(f"its own checks pass: {orders}")
-        return self._go_on(now)
+        if self.outcome is not None or waited < _LISTEN or lacks or not may_arm:
+            return
+        if self._reading is None:
+            self._reading = Script(read_held(self._peer))
+            self._out += self._reading.start(now)
+        elif self._reading.outcome is None:
+            self._out += self._reading.tick(now)
+        elif seen.is_fresh(now):
+            self._held = self._reading.outcome
+            self._judge(now, again=True)
+            if self._passes():
+                orders = f"arming, and starting {seen.items} items"
+                orders = "it is set to follow setpoints, then armed" if self.streams else orders
+                seen.told.append(f"its own checks pass: {orders}")
+                self._go_on(now)
 
     def _lacks(self, now: float) -> str:  # noqa: ARG002
         """Return what it does not know that it has to, in words."""
         return "" if self.seen.knows_place else "it does not know where it is"
 
-    def _stopped(self, ready: Readiness) -> bool:
-        """End where the gate has found an error, and tell whether it has.
+    def _judge(self, now: float, *, again: bool = False) -> None:
+        """Ask the gate, once enough is heard, and `again` or when that is another state."""
+        seen = self.seen
+        known = seen.place is not None and seen.status is not None
+        heard = seen.heartbeat is not None and (known or now >= seen.begun + _LOOK)
+        others = len(seen.stations), len(seen.strangers)
+        state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
+        if self._preflight is not None and heard and (again or state != self._judged):
+            self._judged, self.findings = state, self._preflight(self._held, seen)
+
+    def _passes(self) -> bool:
+        """Tell whether the gate has found no error, and end where it has.
 
         A place that is not known is waited for.
         """
-        errors = [each for each in ready.errors if each.rule != "position-unknown"]
-        if errors:
-            contested = any(each.rule == "ground-station" for each in errors)
-            told = "; ".join(f"{each.message} ({each.action})" for each in errors)
+        errors = [each for each in self.findings or () if each.level is Level.ERROR]
+        stops = [each for each in errors if each.rule != "position-unknown"]
+        if stops:
+            contested = any(each.rule == "ground-station" for each in stops)
+            told = "; ".join(f"{each.message} ({each.action})" for each in stops)
             self._end("contested" if contested else "refused", f"nothing was started: {told}")
-        return bool(errors)
+        return self.findings is not None and not errors
 
-    def _go_on(self, now: float) -> Sequence[Message]:
+    def _go_on(self, now: float) -> None:
         """Give the next of the orders that start it; after the last one it has begun."""
-        left = list(self._starts)
-        if self.phase in left:
-            del left[: left.index(self.phase) + 1]
-        if not left:
+        if not self._left:
             self._begin()
-            return ()
-        self.phase, mode = left[0], self.seen.custom_mode
+            return
+        self.phase, command, params = self._left.pop(0)
+        mode = self.seen.custom_mode
         self._path = (mode,) if self.phase == "arming" else (mode, self._flown)
-        command, params = self._starts[self.phase]
-        return self._say(now, command, *params)
+        self._command(now, command, *params)
 
-    def _ask_to_hold(self, now: float) -> Sequence[Message]:
+    def _ask_to_hold(self, now: float) -> None:
         """Ask the vehicle to hold, until it does."""
         self._path = (*self._path, self._modes.hold)
         self.phase, self.seen.patience = "holding", math.inf
         self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
-        return self._set_mode(now, self._modes.hold)
+        self._set_mode(now, self._modes.hold)
 
-    def _set_mode(self, now: float, mode: int) -> Sequence[Message]:
-        return self._say(now, MavCommand.SET_MODE, *self._family.mode_parameters(mode))
+    def _set_mode(self, now: float, mode: int) -> None:
+        self._command(now, MavCommand.SET_MODE, *self._family.mode_parameters(mode))
 
-    def _say(self, now: float, command: MavCommand, *params: float) -> Sequence[Message]:
+    def _command(self, now: float, command: MavCommand, *params: float) -> None:
         """Give an order, and repeat it until it is answered."""
         self._order = Order(command, params, now)
         if self.phase != "disarming":
-            self._said_before = len(self.seen.said)
-        return self._repeat(now)
+            self.seen.said.clear()
+        self._repeat(now)
 
-    def _repeat(self, now: float) -> Sequence[Message]:
+    def _repeat(self, now: float) -> None:
         order = self._order
         if order is None or now < order.due:
-            return ()
+            return
         if order.sent == TRIES and self.phase == "holding":
             text = f"it does not confirm that it holds, it {order.answer}: it is asked again"
             self.seen.told.append(f"{text} until then")
-        if order.sent >= TRIES and self.phase in self._starts:
-            return self._refused(order, now)
+        if order.sent >= TRIES and self.phase in BEFORE:
+            self._refused(order, now)
+            return
         again = min(order.sent, 255)
+        self._out.append(CommandLong(self._peer.address, order.command, again, *order.params))
         order.sent, order.due = order.sent + 1, now + _AGAIN
-        return [CommandLong(self._peer.address, order.command, again, *order.params)]
 
     # ---- how it ends
 
-    def _refused(self, order: Order, now: float) -> Sequence[Message]:
+    def _refused(self, order: Order, now: float) -> None:
         """End before the start; an aircraft that is armed, or may be, disarms first."""
         then = Ending("refused", f"the vehicle {order.answer}")
         unsure = self.phase == "arming" and not order.refusals
         if unsure or self._armed or self.phase == "starting":
-            return self._disarm(then, now)
-        self._end(then.kind, f"{then.text}{self._words}")
-        return ()
+            self._disarm(then, now)
+        else:
+            self._end(then.kind, f"{then.text}{self._words}")
 
     @property
     def _words(self) -> str:
         """What it has said since the last order, as the end of a sentence."""
-        said = dict.fromkeys(self.seen.said[self._said_before :])
+        said = dict.fromkeys(self.seen.said)
         return f". It says: {'; '.join(said)}" if said else ""
 
-    def _disarm(self, then: Ending, now: float) -> Sequence[Message]:
+    def _disarm(self, then: Ending, now: float) -> None:
         """Have it disarm, and end with `then`."""
         self.phase, self._then = "disarming", then
         self._path = self.seen.custom_mode, self._flown
         self.seen.told.append(f"{then.text}: it is asked to disarm")
-        return self._say(now, MavCommand.ARM, 0.0)
+        self._command(now, MavCommand.ARM, 0.0)
 
     def _leave_armed(self, why: str) -> None:
         """End, though it may still be armed."""
         text = f"{self._then.text}; it may still be armed: {why}{self._words}"
         self._end(self._then.kind, text)
 
-    def _end_as_heard(self, now: float) -> Sequence[Message]:
+    def _end_as_heard(self, now: float) -> None:
         """End where what was heard says so; what may be armed is disarmed whatever that is."""
         ending = self.seen.ending
         if ending is not None and ending.kind == "changed" and self.phase in ("arming", "starting"):
-            return self._disarm(ending, now)
-        if self.phase != "disarming":
+            self._disarm(ending, now)
+        elif self.phase != "disarming":
             self.outcome = ending
         elif ending is not None and ending.kind == "lost":
             self._leave_armed(f"nothing was heard for {self.seen.patience:.0f} s")
-        return ()
 
     def _end(self, kind: Kind, text: str) -> None:
         self.outcome = self.outcome or Ending(kind, text)

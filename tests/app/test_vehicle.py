@@ -18,7 +18,7 @@ from faao_mav.app.vehicle import fly_command, uploaded, watched
 from faao_mav.app.workers import talk
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.fly.fly import fly_mission
-from faao_mav.fly.seen import Flight
+from faao_mav.fly.preflight import Flight
 from faao_mav.plan import parse_plan
 from faao_mav.sim import MockAutopilot
 from faao_mav.sim.faults import Faults

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -13,10 +13,10 @@ from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicl
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
-from faao_mav.fly.gate import LEVEL, NEAR
-from faao_mav.fly.preflight import Readiness
-from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.itinerary import LEVEL, NEAR
+from faao_mav.fly.preflight import Flight, preflight
 from faao_mav.fly.stream import Stream
+from faao_mav.fly.telemetry import Held
 from faao_mav.fly.watch import Watch
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission
@@ -162,13 +162,12 @@ class Scene:
         self.mock.flight._fly = fly
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
-        rows, peer = self.mock.lists.items(MissionType.MISSION), peer_of(kind)
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        held = held_by(self.mock, untold)
-        ready = Readiness(flight, held, peer, elsewhere=elsewhere, untimed=untimed)
-        self.watch: Any = Watch(peer, rows, ready, arm=self.arm, lands=lands)
+        held, peer = held_by(self.mock, untold), peer_of(kind)
+        gate = partial(preflight, flight, elsewhere=elsewhere, untimed=untimed)
+        self.watch: Any = Watch(peer, held, gate, arm=self.arm, lands=lands)
         if solution is not None:
-            self.watch = Stream(peer, solution, ready)
+            self.watch = Stream(peer, solution, held, gate)
         self.client = Counted(self.watch)
         self.solution = solution
         self.times, self.sent, self.places = list[float](), list[Real](), list[Real]()

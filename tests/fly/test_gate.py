@@ -12,9 +12,8 @@ from scenes import CAP, SWIFT, ZONE, swift
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
-from faao_mav.fly.course import Course, at_rest
-from faao_mav.fly.gate import LEVEL, NEAR, Gate
-from faao_mav.fly.itinerary import Itinerary
+from faao_mav.fly.itinerary import LEVEL, NEAR, Gate, Itinerary
+from faao_mav.fly.setpoints import Course, at_rest
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.transit import way_between
@@ -110,7 +109,7 @@ def carried(
     While it is `lost`, s, nothing is heard of it; then it is at `place` (3,).
     """
     tell: Callable[[str], object] = print if told is None else told.append
-    flight = Itinerary(solution, Gate(solution.plan, tell), tell, takes_off=False)
+    flight = Itinerary(solution, tell, takes_off=False)
     now, t, times, places = np.zeros(3), 0.0, list[float](), list[Real]()
     while flight.part != "over" and flight.trouble is None and t < 600:
         t += 0.1
@@ -182,7 +181,7 @@ def test_an_aircraft_that_does_not_follow_is_given_up() -> None:
     """It stays where it is, or a wind drifts it off again and again."""
     for drift in (0.0, -8.0):
         solution, t, place = swift(), 0.0, np.array([0.0, 0.0, 30.0])
-        flight = Itinerary(solution, Gate(solution.plan, print), print, takes_off=True)
+        flight = Itinerary(solution, print, takes_off=True)
         while flight.trouble is None and flight.part != "over" and t < 900:
             t += 0.1
             setpoint = flight.setpoint(t, place, np.zeros(3))

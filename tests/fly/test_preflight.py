@@ -27,8 +27,7 @@ from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, v
 from faao_mav import parse_plan, plan_mission
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor
-from faao_mav.fly.preflight import preflight
-from faao_mav.fly.seen import Flight
+from faao_mav.fly.preflight import Flight, preflight
 from faao_mav.fly.telemetry import Telemetry
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence

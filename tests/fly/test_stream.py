@@ -9,15 +9,14 @@ from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import HOLD, LAND, Scene, is_setpoint, low, swift, under
-from stations import a_mission, peer_of, vehicle_of
+from stations import peer_of, vehicle_of
 
 from faao_mav import optimize
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InfeasibleError, InputError
-from faao_mav.fly.own import OwnClock
-from faao_mav.fly.preflight import Readiness
-from faao_mav.fly.seen import Flight, Held
+from faao_mav.fly.setpoints import OwnClock
 from faao_mav.fly.stream import Stream
+from faao_mav.fly.telemetry import Held
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction
@@ -85,9 +84,8 @@ def test_a_convoy_is_served_as_planned(kind: str) -> None:
 def test_only_copters_are_flown_by_setpoints() -> None:
     peer = peer_of("ardupilot")
     plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
-    ready = Readiness(Flight(a_mission(5)), Held({}, Reading({})), plane)
     with pytest.raises(InputError, match="only copters"):
-        Stream(plane, low(), ready)
+        Stream(plane, low(), Held({}, Reading({})), lambda *_: ())
 
 
 @pytest.mark.parametrize("finish", ["rtl", "hover"])

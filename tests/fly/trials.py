@@ -13,7 +13,7 @@ from scenes import LOITER, arms, harmless
 from stages import PLANS, Stage
 from stations import VEHICLE, Counted
 
-from faao_mav.fly.gate import LEVEL, NEAR
+from faao_mav.fly.itinerary import LEVEL, NEAR
 from faao_mav.fly.telemetry import Kind
 from faao_mav.geodesy import LocalFrame
 from faao_mav.wire.messages import (

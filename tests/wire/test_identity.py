@@ -16,7 +16,7 @@ from stations import HOME, VEHICLE, Air, a_mission, hurry
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly_mission
-from faao_mav.fly.seen import Flight
+from faao_mav.fly.preflight import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import download, upload
 from faao_mav.wire.client import holdings
