@@ -87,16 +87,14 @@ class Stream(Watch):
         self._home_told = False
         self._unsure_since: float | None = None
         """Since when it is not known who flies it: then nothing that moves it is sent."""
-        self._heard_at = self._sent_by = math.inf
-        self._first_sent, self._last_sent = math.inf, -math.inf
+        self._first_sent, self._last_sent, self._sent_by = math.inf, -math.inf, math.inf
         if self._rules.loss:
             self.seen.ask_for(CURRENT_MODE, _MODE_AGAIN)
 
     def _hear(self, message: Message, now: float) -> None:
         in_flight = self.phase in ("flying", "ending", "holding")
-        if in_flight and now > self._heard_at + self._without_setpoints:
+        if in_flight and self.seen.silence > self._without_setpoints:
             self._unsure_since, self.seen.wanted = now, None  # it may be in another mode since
-        self._heard_at = now
         super()._hear(message, now)
         match message:
             case GpsGlobalOrigin():
@@ -140,7 +138,7 @@ class Stream(Watch):
         assert position is not None
         self._frame.home = position.alt - position.relative_alt
         climb = 0.0 if self._by_setpoints else self._height / _SLOW_CLIMB
-        self._sent_by = self._heard_at + PATIENCE + climb
+        self._sent_by = self.seen.heard_at + PATIENCE + climb
 
     def _on_mode(self, mode: int, now: float) -> None:
         if mode in self._path:
@@ -169,7 +167,7 @@ class Stream(Watch):
         if by_itself and wanted is not None and wanted.intended_custom_mode == self._flown:
             if self.seen.told[-1] != _FAILSAFE:
                 self.seen.told.append(_FAILSAFE)
-        elif self._armed or self.phase != "ending":
+        elif self.seen.armed or self.phase != "ending":
             self._step_aside()
 
     def _repeat(self, now: float) -> None:

@@ -1,5 +1,6 @@
 """What is held and seen of a vehicle: its lists and parameters, and what it tells of its flight."""
 
+import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
@@ -164,7 +165,9 @@ class Telemetry:
     once its estimator knows where it is. `place` is where it is by `position`, m above the sea,
     None where it does not tell. `stations` are other ground stations that were heard, `strangers`
     addresses on the network from which something else speaks in its name. `ending` is why nothing
-    more can be known, None as long as something can. `begun` is when it began to listen, s.
+    more can be known, None as long as something can. `begun` is when it began to listen, `heard_at`
+    when it last heard the vehicle, after a `silence`, and `disarmed_at` when that was armed no
+    more, infinite as long as it is or never was, all in s.
     """
 
     def __init__(self, peer: Peer, rows: Sequence[WireItem], rate: float = POSITION_RATE) -> None:
@@ -186,14 +189,15 @@ class Telemetry:
         self.strangers: Set[str] = set()
         self.ending: Ending | None = None
         self._batteries: dict[int, int] = {}
-        self._beat_at = self._placed_at = float("-inf")
+        self.disarmed_at = math.inf
+        self._beat_at = self._placed_at = -math.inf
         self._periods = {POSITION: 1 / rate, SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
         self._next_item = self._home
         self.start(0.0)
 
     def start(self, now: float) -> None:
         """Begin to listen."""
-        self.begun, self._last_heard, self._is_silent = now, now, False
+        self.begun, self.heard_at, self.silence, self._is_silent = now, now, 0.0, False
         self._needed = dict.fromkeys(self._periods, now - _MISSED)
         self._next_reading = now
 
@@ -238,7 +242,7 @@ class Telemetry:
     def where(self, now: float) -> str:
         """Return in words its mode and height, and how old that is."""
         height = f", {self.height:.0f} m above home" if self.fixes else ""
-        old = f", {now - self._last_heard:.0f} s ago" if self._is_silent else ""
+        old = f", {now - self.heard_at:.0f} s ago" if self._is_silent else ""
         return f"in mode {self.mode}{height}{old}"
 
     @property
@@ -261,13 +265,16 @@ class Telemetry:
             self.told.append(f"another ground station is on this link: {sender}")
         if sender != self._peer.address:
             return
+        self.silence, self.heard_at = now - self.heard_at, now
         if self._is_silent:
-            self.told.append(f"heard again after {now - self._last_heard:.0f} s")
-        self._last_heard, self._is_silent = now, False
+            self._is_silent = False
+            self.told.append(f"heard again after {self.silence:.0f} s")
         match message:
             case BatteryStatus(battery_function=function) if function in _PROPULSION:
                 self._batteries[message.id] = message.battery_remaining
-            case Heartbeat():
+            case Heartbeat(armed=armed):
+                if armed != self.armed:
+                    self.disarmed_at = math.inf if armed else now
                 self.heartbeat, self._beat_at = message, now
                 if self.wanted is not None and self.wanted.custom_mode != message.custom_mode:
                     self.wanted = None
@@ -299,7 +306,7 @@ class Telemetry:
 
     def tick(self, now: float) -> list[Message]:
         """Take note of the time, and return what to ask the vehicle."""
-        quiet = now - self._last_heard
+        quiet = now - self.heard_at
         if quiet >= self.patience:
             self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
         elif quiet >= _SILENT and not self._is_silent:

@@ -87,10 +87,9 @@ class Watch(Machine[Ending]):
 
     With `arm` it arms the vehicle and starts the mission: once the autopilot's own checks pass, it
     knows where it is, no other ground station was heard, what it holds has been read again and the
-    gate finds no error. After
-    `PATIENCE` seconds of checks that do not pass it ends. Nothing is ever sent again, but what asks
-    for telemetry, once the mode is one that was not asked for: then the pilot, or a failsafe, has
-    the aircraft. Without `arm` nothing else is sent at all.
+    gate finds no error. After `PATIENCE` seconds of checks that do not pass it ends. Nothing is
+    ever sent again, but what asks for telemetry, once the mode is one that was not asked for: then
+    the pilot, or a failsafe, has the aircraft. Without `arm` nothing else is sent at all.
 
     `cancel` asks a flight that was started here to hold, and again until it does or a pilot has it,
     however long the link is silent; a second time it leaves it, as any other flight. `hang_up`
@@ -146,8 +145,7 @@ class Watch(Machine[Ending]):
         self._order: Order | None = None
         self._path: tuple[int, ...] = ()
         """The modes of this phase, in the order in which they come; none: any."""
-        self._furthest, self._armed, self._unattended = 0, False, False
-        self._aside_since, self._disarmed_at = -math.inf, math.inf
+        self._furthest, self._unattended, self._aside_since = 0, False, -math.inf
         self._then = Ending("refused", "")
         self._out: list[Message] = []
         """What is said once the present call returns."""
@@ -168,7 +166,7 @@ class Watch(Machine[Ending]):
         elif self.phase == "disarming":
             self._leave_armed("interrupted again")
         else:
-            armed = "armed" if self._armed else "not armed"
+            armed = "armed" if self.seen.armed else "not armed"
             holds = self.phase != "holding" or not asked
             doubt = "" if holds else ", and has not confirmed that it holds"
             self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}{doubt}")
@@ -214,12 +212,9 @@ class Watch(Machine[Ending]):
                     self._answered(order, result, now)
             case Heartbeat(armed=armed, custom_mode=mode):
                 # A first heartbeat may be from before the order.
-                told = self._armed or (order is not None and order.sent > 1)
+                told = self.seen.disarmed_at == now or (order is not None and order.sent > 1)
                 if self.phase == "disarming" and told and not armed:
                     self._end(self._then.kind, f"{self._then.text}; it is disarmed{self._words}")
-                if self._armed != armed:
-                    self._disarmed_at = math.inf if armed else now
-                self._armed = armed
                 self._on_mode(mode, now)
             case MissionCurrent() if not self.streams:
                 self._on_current(message, now)
@@ -228,15 +223,15 @@ class Watch(Machine[Ending]):
         """Do what is due."""
         self._out += self.seen.tick(now)
         self._end_as_heard(now)
-        if now >= self._disarmed_at + _REBOOT:
-            self._disarmed_at = math.inf
+        if now >= self.seen.disarmed_at + _REBOOT:
+            self.seen.disarmed_at = math.inf
             self._on_disarmed()
         over = self.phase in ("holding", "ending", "aside") and self._order is None
         if self._unattended and over:
             self._end("left", f"the terminal has gone; the vehicle is in mode {self.seen.mode}")
         if self.outcome is not None:
             return
-        if self.phase == "checking" or (self.phase == "waiting" and not self._armed):
+        if self.phase == "checking" or (self.phase == "waiting" and not self.seen.armed):
             self._judge(now)
         if self.phase == "checking":
             self._check(now)
@@ -263,7 +258,7 @@ class Watch(Machine[Ending]):
             self._path = self._path[self._path.index(mode) :]
         match self.phase:
             case "waiting" | "starting" if (
-                self._armed and mode == self._modes.mission and not self.streams
+                self.seen.armed and mode == self._modes.mission and not self.streams
             ):
                 self._begin()
             case "holding" if self._path == (mode,) and self._order is not None:
@@ -433,7 +428,7 @@ class Watch(Machine[Ending]):
         """End before the start; an aircraft that is armed, or may be, disarms first."""
         then = Ending("refused", f"the vehicle {order.answer}")
         unsure = self.phase == "arming" and not order.refusals
-        if unsure or self._armed or self.phase == "starting":
+        if unsure or self.seen.armed or self.phase == "starting":
             self._disarm(then, now)
         else:
             self._end(then.kind, f"{then.text}{self._words}")

@@ -1,6 +1,5 @@
 """Flights by setpoints: the plan is kept, and what no scene can say of streams in trouble."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -142,21 +141,6 @@ def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> 
     assert scene.run(Faults(outages=((47.0, 50.0),)), events=events) == "taken over"
     assert scene.told("it is in its failsafe")
     assert scene.after(50.0) == 0
-
-
-@KINDS
-def test_what_it_does_without_setpoints_has_to_be_known(kind: str) -> None:
-    vehicle = vehicle_of(kind)
-    assert vehicle is not None
-    rules = vehicle.family.setpoints
-    scene = Scene(kind, solution=low(), untold=rules.defaults)
-    assert scene.run() == "refused"
-    assert f"it does not tell {' and '.join(rules.defaults)}" in scene.watch.outcome.text
-    assert scene.orders == []
-    values = rules.defaults | {rules.timeout: 1.0}
-    assert rules.refusal(values) is None
-    for value in (math.nan, 2.5):
-        assert rules.refusal(values | {rules.loss or rules.timeout: value}) is not None
 
 
 def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:
