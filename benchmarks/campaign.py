@@ -26,12 +26,12 @@ def main() -> int:
     count, first = [*given, *(300, 0)[len(given) :]]
     endings, setpoints, wrong = Counter[str](), 0, 0
     for seed in range(first, first + count):
-        judged = flown(Trial.of(seed))
-        endings[judged.ending] += 1
-        setpoints += judged.setpoints
-        if judged.wrong:
+        judge = flown(Trial.of(seed))
+        endings[judge.outcome.kind if judge.outcome else ""] += 1
+        setpoints += judge.setpoints
+        if judge.wrong:
             wrong += 1
-            print(f"{seed}: {judged.trial}: {judged.text}: {'; '.join(judged.wrong[:5])}")
+            print(f"{seed}: {judge.trial}: {judge.outcome}: {'; '.join(judge.wrong[:5])}")
     told = ", ".join(f"{number} {ending}" for ending, number in endings.most_common())
     print(f"{count} flights, {setpoints:,} setpoints: {told}; in {wrong} of them something wrong")
     return int(wrong > 0)

@@ -14,7 +14,7 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.autopilot import Track
 from faao_mav.errors import InputError
 from faao_mav.fly.fly import FlightReport
-from faao_mav.fly.watch import Watch
+from faao_mav.fly.watch import BEFORE, Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.precoder_table import check_of_slots, taken_by
 from faao_mav.validate.comparison import predicted_line
@@ -22,7 +22,6 @@ from faao_mav.validate.flown import (
     Debriefing,
     FlightRecord,
     Line,
-    Standing,
     debriefing,
     late,
     plan_start,
@@ -159,10 +158,9 @@ class Telling:
             self._radios.tell(None if start is None else fixes[-1].t - start, place)
         now = time.monotonic()
         ready = seen.heartbeat is not None and fixes and fixes[-1].t >= self._last + _PERIOD
-        if not ready or now < self._next:
-            return
-        self._next, self._last = now + _PERIOD, fixes[-1].t
-        self._say(_as_dict(watch, self._standing(watch), self._solution))
+        if ready and now >= self._next:
+            self._next, self._last = now + _PERIOD, fixes[-1].t
+            self._say(self._row(watch))
 
     def debriefing(self, report: FlightReport) -> Debriefing | None:
         """Return what became of the plan; None without one, or without its flight."""
@@ -170,42 +168,41 @@ class Telling:
             return None
         return debriefing(self._solution, self._line, report.record, report.relay_start)
 
-    def _standing(self, watch: Watch) -> Standing | None:
+    def _row(self, watch: Watch) -> dict[str, Any]:
+        """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
+        seen, last = watch.seen, watch.seen.fixes[-1]
+        volts = _NO_VOLTAGE if seen.status is None else seen.status.voltage_battery
+        return {
+            "t": last.t,
+            "phase": watch.phase,
+            "mode": seen.mode,
+            "item": seen.row,
+            "latitude": last.latitude,
+            "longitude": last.longitude,
+            "height": seen.height,
+            "volts": None if volts == _NO_VOLTAGE else volts / 1000,
+            "battery": seen.battery,
+            "plan": self._standing(watch),
+        }
+
+    def _standing(self, watch: Watch) -> dict[str, Any] | None:
         """Return how the flight stands; None before it has left w_I, and when it is over."""
-        before = watch.phase in ("checking", "engaging", "arming", "starting", "waiting")
-        if self._solution is None or self._line is None or before:
+        solution = self._solution
+        if solution is None or self._line is None or watch.phase in BEFORE:
             return None
         record, start = watch.seen.record(), watch.relay_start
         if start is None and not watch.streams:
-            flight = record.line(self._solution)
-            self._start = start = plan_start(self._solution, self._line, flight)
+            self._start = start = plan_start(solution, self._line, record.line(solution))
         if start is None:
             return None
-        stands = standing(self._solution, self._line, record.line(self._solution, start))
-        return None if stands.over else stands
-
-
-def _as_dict(watch: Watch, stands: Standing | None, solution: Solution | None) -> dict[str, Any]:
-    """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
-    seen, last = watch.seen, watch.seen.fixes[-1]
-    volts = _NO_VOLTAGE if seen.status is None else seen.status.voltage_battery
-    told: dict[str, Any] = {
-        "t": last.t,
-        "phase": watch.phase,
-        "mode": seen.mode,
-        "item": seen.row,
-        "latitude": last.latitude,
-        "longitude": last.longitude,
-        "height": seen.height,
-        "volts": None if volts == _NO_VOLTAGE else volts / 1000,
-        "battery": seen.battery,
-        "plan": None if stands is None else asdict(stands),
-    }
-    if stands is not None and solution is not None:
+        stands = standing(solution, self._line, record.line(solution, start))
+        if stands.over:
+            return None
+        told = asdict(stands)
         for name in ("delivered", "expected"):
-            rate = told["plan"][name] / solution.plan.flight.duration
-            told["plan"][f"{name}_mbytes"] = solution.plan.megabytes(rate)
-    return told
+            rate = told[name] / solution.plan.flight.duration
+            told[f"{name}_mbytes"] = solution.plan.megabytes(rate)
+        return told
 
 
 def findings_text(findings: Sequence[Finding]) -> str:

@@ -54,9 +54,6 @@ METRE = 1e7 / 111_319.5
 
 LOITER = 5
 """A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
-LAND = 4 << 16 | 6 << 24
-"""PX4's."""
-HOLD = {"ardupilot": 17, "px4": 4 << 16 | 3 << 24}
 
 LOW: dict[str, Any] = {
     "flight.start_velocity": "hover",
@@ -150,7 +147,6 @@ class Scene:
         flight: Flight | None = None,
         elsewhere: bool = False,
         untimed: bool = False,
-        untold: Collection[str] = (),
         **options: Any,
     ) -> None:
         self.arm = bool(options.pop("arm", False))
@@ -163,7 +159,7 @@ class Scene:
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        held, peer = held_by(self.mock, untold), peer_of(kind)
+        held, peer = held_by(self.mock), peer_of(kind)
         gate = partial(preflight, flight, elsewhere=elsewhere, untimed=untimed)
         self.watch: Any = Watch(peer, held, gate, arm=self.arm, lands=lands)
         if solution is not None:

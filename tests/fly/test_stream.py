@@ -7,7 +7,8 @@ import pytest
 from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import HOLD, LAND, Scene, is_setpoint, low, swift, under
+from scenes import Scene, low, under
+from stages import Stage
 from stations import peer_of, vehicle_of
 
 from faao_mav import optimize
@@ -133,12 +134,12 @@ def test_what_others_asked_tells_nothing_of_the_link() -> None:
 
 def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> None:
     """It was in that mode for want of setpoints before: the last that was heard is a failsafe."""
-    scene = Scene("px4", solution=swift(), parameters={"COM_OBL_RC_ACT": 5})
-    scene.loses(lambda message, now: is_setpoint(message) and 44.0 < now < 48.5)
-    modes = Heartbeat | CurrentMode  # which come after positions, when the link is back
+    happens = "44-48.5 loses setpoints; 47-50 silence; 48 hold; 70 land"
+    stage = Stage("swift", "px4", {"COM_OBL_RC_ACT": "5"}, happens)
+    scene, modes = stage.scene, Heartbeat | CurrentMode
+    # These come after positions, when the link is back.
     scene.tells(lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :])
-    events = [(48.0, scene.sets(HOLD["px4"])), (70.0, scene.sets(LAND))]
-    assert scene.run(Faults(outages=((47.0, 50.0),)), events=events) == "taken over"
+    assert stage.play(()) == "taken over"
     assert scene.told("it is in its failsafe")
     assert scene.after(50.0) == 0
 

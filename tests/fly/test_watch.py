@@ -1,9 +1,8 @@
 """Watching a flight: every end has its name, and nothing is sent that was not asked for."""
 
-from collections.abc import Callable
-
 import pytest
-from scenes import Scene, arms, starts
+from scenes import Scene, starts
+from stages import Stage
 from stations import VEHICLE
 
 from faao_mav.wire.messages import CommandAck, Envelope
@@ -32,34 +31,23 @@ def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
     assert scene.commands == [*[ARM] * 5, DISARM]
 
 
-def refusing(kind: str, deaf: Callable[[float], bool] = lambda _: False) -> Scene:
-    """Return a scene whose vehicle denies the start, and hears no order to disarm while `deaf`."""
-    scene = Scene(kind, arm=True)
-    scene.loses(lambda message, now: arms(message, 0.0) and deaf(now))
-    on, denial = scene.mock.on, CommandAck(GROUND_STATION, MavCommand.START, 4)
-    scene.mock.on = lambda envelope, now: (
-        [denial] if starts(envelope.message) else on(envelope, now)
-    )
-    return scene
-
-
 def test_a_late_answer_to_arming_is_none_to_disarming() -> None:
-    scene = refusing("ardupilot", lambda now: now < 10.0)
+    stage = Stage("mission", "ardupilot", {"refuses": ""}, "0-10 loses disarm")
 
     def answer(now: float) -> None:
         ack = CommandAck(GROUND_STATION, MavCommand.ARM, 0)
-        scene.client.on(Envelope(VEHICLE, ack), now)
+        stage.scene.client.on(Envelope(VEHICLE, ack), now)
 
-    assert scene.run(events=[(3.0, answer), (3.1, answer)]) == "refused"
-    assert not scene.mock.armed
+    assert stage.play([(3.0, answer), (3.1, answer)]) == "refused"
+    assert not stage.scene.mock.armed
 
 
 @KINDS
 def test_what_refuses_to_disarm_is_told_as_armed(kind: str) -> None:
-    scene = refusing(kind)
-    arm = scene.mock._arm
+    stage = Stage("mission", kind, {"refuses": ""}, "")
+    scene, arm = stage.scene, stage.scene.mock._arm
     scene.mock._arm = lambda wanted: arm(True) if wanted else 4
-    assert scene.run() == "refused"
+    assert stage.play(()) == "refused"
     assert "it may still be armed: it answers ARM with FAILED" in scene.watch.outcome.text
     assert scene.commands.count(DISARM) == 5
 

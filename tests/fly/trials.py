@@ -116,19 +116,8 @@ _INCIDENTS: dict[str, Any] = {
 }
 
 
-@dataclass
-class Judged:
-    """How a trial went: how it ended, and what must not have happened."""
-
-    trial: Trial
-    ending: str
-    text: str
-    wrong: list[str]
-    setpoints: int
-
-
 class Judge(Counted):
-    """A watch whose every message is judged as it is sent."""
+    """A watch whose every message is judged as it is sent: `wrong` is what must not happen."""
 
     def __init__(self, trial: Trial, stage: Stage) -> None:
         super().__init__(stage.scene.watch)
@@ -206,8 +195,8 @@ class Judge(Counted):
             self.wrong.append(f"{now:.1f} s: sent across the fence, {across:.1f} m")
 
 
-def flown(trial: Trial) -> Judged:
-    """Fly it."""
+def flown(trial: Trial) -> Judge:
+    """Fly it, and return what it is judged by."""
     given = dict(word.partition("=")[::2] for word in trial.given)
     stage = Stage(trial.flies, trial.kind, given, trial.happens)
     judge = stage.scene.client = Judge(trial, stage)
@@ -215,5 +204,4 @@ def flown(trial: Trial) -> Judged:
     outcome = judge.outcome
     if outcome is None or outcome.kind not in get_args(Kind) or not outcome.text:
         judge.wrong.append(f"no end, or one without a name: {outcome}")
-    kind, text = ("", "") if outcome is None else (outcome.kind, outcome.text)
-    return Judged(trial, kind, text, judge.wrong, judge.setpoints)
+    return judge
