@@ -203,12 +203,11 @@ def _lists(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterato
             for wrong in held.other_than(wanted, part, seen.vehicle)[:1]:
                 yield _found("holds-another", rule=rule, wrong=wrong)
         elif rows:
-            title, level, idle = part.title, Level.ERROR, ""
-            if part is MissionType.FENCE:
-                title = "a fence"
-                if own.type.at_fence(own).action == "nothing":
-                    level, idle = Level.WARNING, ", and does nothing about it"
-            items = counted(len(rows), "item")
+            fence = part is MissionType.FENCE
+            level, idle = None, ""
+            if fence and own.type.at_fence(own).action == "nothing":
+                level, idle = Level.WARNING, ", and does nothing about it"
+            title, items = "a fence" if fence else part.title, counted(len(rows), "item")
             yield _found("holds-more", level, rule, title=title, items=items, idle=idle)
 
 
