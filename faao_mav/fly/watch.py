@@ -148,7 +148,8 @@ class Watch(Machine[Ending]):
         self._furthest, self._unattended, self._aside_since = 0, False, -math.inf
         self._then = Ending("refused", "")
         self._out: list[Message] = []
-        """What is said once the present call returns."""
+        """What is said once the present call returns; not said any more when an interrupt cuts that
+        short, as it may anywhere: no order is to follow it."""
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen, and ask for telemetry."""
@@ -157,6 +158,7 @@ class Watch(Machine[Ending]):
 
     def cancel(self, now: float) -> Sequence[Message]:
         """Ask the flight to hold, or leave it, and say how: what has been asked for is told."""
+        self._out.clear()
         asked = self._order is not None
         begun = self._arms and self.phase in ("starting", "flying")
         if begun or (self.phase == "ending" and asked):
@@ -178,6 +180,7 @@ class Watch(Machine[Ending]):
 
         A flight by setpoints is to hold: it needs this end. What is not confirmed is waited for.
         """
+        self._out.clear()
         self._unattended = True
         if self._order is not None and self.phase in ("holding", "ending", "disarming"):
             return ()

@@ -66,14 +66,13 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     assert {each.type_mask for each in setpoints(scene)} == {3072}
 
 
-@KINDS
-def test_a_convoy_is_served_as_planned(kind: str) -> None:
+def test_a_convoy_is_served_as_planned() -> None:
     velocities = dict.fromkeys(
         ("radio.base_station.velocity", "radio.ground_user.velocity"), (5, 0)
     )
     changes = {"flight.duration": 24, "flight.end": [110, 20], "radio.causal": True}
     solution = optimize(low().plan.changed(velocities | changes))
-    scene = Scene(kind, solution=solution)
+    scene = Scene("px4", solution=solution)
     assert scene.run(Faults()) == "finished"
     found = flown(scene, solution)
     assert found.delivered_rate == pytest.approx(solution.delivered_rate, rel=0.01)

@@ -1,11 +1,13 @@
 """Watching a flight: every end has its name, and nothing is sent that was not asked for."""
 
+from typing import Any
+
 import pytest
-from scenes import Scene, starts
+from scenes import Scene, arms, starts
 from stages import Stage
 from stations import VEHICLE
 
-from faao_mav.wire.messages import CommandAck, Envelope
+from faao_mav.wire.messages import CommandAck, CommandLong, Envelope
 from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
 
 KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
@@ -65,3 +67,22 @@ def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
     scene.loses(changes)
     assert scene.run() == "changed"
     assert not scene.mock.armed
+
+
+def test_an_interrupt_while_an_order_is_given_takes_it_back() -> None:
+    """Ctrl-C comes anywhere: here between the order to arm, or to start, and its sending."""
+    for ordered, then in ((arms, [DISARM]), (starts, [(MavCommand.SET_MODE, 1.0)])):
+        scene = Scene("ardupilot", arm=True)
+        said = scene.watch._said
+
+        def interrupted(watch: Any = scene.watch, ordered: Any = ordered, said: Any = said) -> Any:
+            if any(ordered(message) for message in watch._out):
+                watch._said = said
+                raise KeyboardInterrupt
+            return said()
+
+        scene.watch._said = interrupted
+        with pytest.raises(KeyboardInterrupt):
+            scene.run()
+        orders = [each for each in scene.watch.cancel(100.0) if isinstance(each, CommandLong)]
+        assert [(each.command, each.param1) for each in orders] == then
