@@ -33,7 +33,7 @@ Phase: TypeAlias = Literal[
 Preflight: TypeAlias = Callable[[Held, Telemetry], tuple[Finding, ...]]
 """The gate before a flight: what stands against it, by what is held and seen of the vehicle."""
 
-_AGAIN, TRIES = 1.5, 5
+_AGAIN, _TRIES = 1.5, 5
 """Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
 guide has it for missions."""
 
@@ -259,10 +259,9 @@ class Watch(Machine[Ending]):
             self._on_another_mode(mode, now)
         elif self._path:
             self._path = self._path[self._path.index(mode) :]
+        on_mission = self.seen.armed and mode == self._modes.mission and not self.streams
         match self.phase:
-            case "waiting" | "starting" if (
-                self.seen.armed and mode == self._modes.mission and not self.streams
-            ):
+            case "waiting" | "starting" if on_mission:
                 self._begin()
             case "holding" if self._path == (mode,) and self._order is not None:
                 self._order, self.seen.patience = None, PATIENCE
@@ -272,10 +271,9 @@ class Watch(Machine[Ending]):
         """Step aside for who set that; the last item has a mode of its own, as PX4's return."""
         if self.phase == "flying" and self._furthest >= self._last:
             self._over()
-            return
-        if self.phase == "flying":
-            self._aside_since = now
-        self._step_aside()
+        else:
+            self._aside_since = now if self.phase == "flying" else -math.inf
+            self._step_aside()
 
     def _answered(self, order: Order, result: int, now: float) -> None:
         """Go on, or end, now that an order is answered.
@@ -292,10 +290,10 @@ class Watch(Machine[Ending]):
             case "arming" if self.streams and now < self.seen.begun + PATIENCE:
                 order.sent = 0
             case "arming":
-                order.sent, order.due = TRIES, now + _WORDS
+                order.sent, order.due = _TRIES, now + _WORDS
             case "starting" if not accepted:
                 self._refused(order, now)
-            case "disarming" if order.refusals == TRIES:
+            case "disarming" if order.refusals == _TRIES:
                 self._leave_armed(f"it {order.answer}")
 
     def _begin(self) -> None:
@@ -415,10 +413,10 @@ class Watch(Machine[Ending]):
         order = self._order
         if order is None or now < order.due:
             return
-        if order.sent == TRIES and self.phase == "holding":
+        if order.sent == _TRIES and self.phase == "holding":
             text = f"it does not confirm that it holds, it {order.answer}: it is asked again"
             self.seen.told.append(f"{text} until then")
-        if order.sent >= TRIES and self.phase in BEFORE:
+        if order.sent >= _TRIES and self.phase in BEFORE:
             self._refused(order, now)
             return
         again = min(order.sent, 255)
