@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot import FlightPath, Model, Vehicle
 from faao_mav.autopilot.ardupilot.copter import ArduCopter
-from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs
-from faao_mav.autopilot.ardupilot.copter.target import Target
+from faao_mav.autopilot.ardupilot.legs import StraightLegs
 from faao_mav.autopilot.ardupilot.plane import ArduPlane
+from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import PX4_BODY, CopterBody, PlaneBody
 from faao_mav.autopilot.px4 import Px4
 from faao_mav.errors import InputError

@@ -18,10 +18,9 @@ from faao_mav.autopilot.body import PX4_BODY
 from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.orbit import RallyRule, plane_orbit
-from faao_mav.autopilot.parameter import ParameterValues, Recommended
+from faao_mav.autopilot.parameter import ParameterValues, Recommended, row, rule, table
 from faao_mav.autopilot.px4.dialect import DIALECT
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
-from faao_mav.autopilot.px4.parameters import COPTER_TABLE, PLANE_TABLE
 from faao_mav.autopilot.vehicle_type import (
     AutopilotFamily,
     FenceResponse,
@@ -141,6 +140,46 @@ def _rally(vehicle: ParameterValues) -> RallyRule:
     return RallyRule(math.inf if kind in (0, 1, 3) else -1.0, home=kind != 1)
 
 
+_SHARED = (
+    rule("takeoff_land_required", 0, "MIS_TKO_LAND_REQ"),
+    rule("first_waypoint_distance", 10_000.0, "MIS_DIST_1WP", "m"),
+    rule("takeoff_height", 2.5, "MIS_TAKEOFF_ALT", "m"),
+    rule("fence_action", 2, "GF_ACTION"),
+    rule("fence_predict", 0, "GF_PREDICT"),
+    rule("fence_distance", 0.0, "GF_MAX_HOR_DIST", "m"),
+    rule("fence_height", 0.0, "GF_MAX_VER_DIST", "m"),
+    rule("return_height", 60.0, "RTL_RETURN_ALT", "m", 0.0),
+    rule("return_type", 0, "RTL_TYPE"),
+)
+"""Mission checks, fence and return."""
+
+
+_COPTER_TABLE = table(
+    *Px4.parameters(),
+    row("greatest_acceleration", "m/s^2", 5.0, "MPC_ACC_HOR_MAX", least=0.1),
+    row("lean_angle", "rad", 45, "MPC_TILTMAX_AIR", least=20, greatest=89),
+    row("max_climb_speed", "m/s", 3.0, "MPC_Z_VEL_MAX_UP"),
+    row("max_descent_speed", "m/s", 1.5, "MPC_Z_VEL_MAX_DN"),
+    row("take_off_speed", "m/s", 1.5, "MPC_TKO_SPEED"),
+    row("landing_speed", "m/s", 0.7, "MPC_LAND_SPEED", least=0.05),
+    *_SHARED,
+)
+"""A PX4 multicopter's parameters."""
+
+_PLANE_TABLE = table(
+    row("cruise_speed", "m/s", 15.0, "FW_AIRSPD_TRIM", least=1.0),
+    row("min_speed", "m/s", 10.0, "FW_AIRSPD_MIN", least=1.0),
+    row("max_speed", "m/s", 20.0, "FW_AIRSPD_MAX", least=1.0),
+    row("roll_limit", "rad", 50, "FW_R_LIM", least=5, greatest=85),
+    row("climb_speed", "m/s", 5.0, "FW_T_CLMB_MAX"),
+    row("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX"),
+    row("landing_angle", "rad", 5, "FW_LND_ANG", least=0, greatest=85),
+    row("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", least=0.05),
+    row("loiter_radius", "m", 80.0, "NAV_LOITER_RAD", least=-math.inf),
+    *_SHARED,
+)
+"""A PX4 plane's parameters."""
+
 _px4_type = partial(
     VehicleType,
     family=PX4,
@@ -158,7 +197,7 @@ PX4_COPTER = _px4_type(
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
     modes=_MODES,
     hovers=True,
-    parameters=COPTER_TABLE,
+    parameters=_COPTER_TABLE,
     fence_ahead=_fence_ahead,
     flight_model=Px4.from_vehicle,
     recommendation=Recommended(
@@ -176,7 +215,7 @@ PX4_PLANE = _px4_type(
     mav_types=(1,),
     modes=replace(_MODES, guided=None),
     hovers=False,
-    parameters=PLANE_TABLE,
+    parameters=_PLANE_TABLE,
     unmodelled="there is no model of how PX4 flies planes",
     orbits=plane_orbit,
 )

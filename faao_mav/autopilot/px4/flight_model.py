@@ -11,6 +11,7 @@ from faao_mav.autopilot.flight_path import STEP, Copter, FlightPath, Flown, Samp
 from faao_mav.autopilot.px4.guidance import (
     Axis,
     GuidedLeg,
+    Px4Limits,
     climb_setpoint,
     corner_speed,
     follow,
@@ -18,7 +19,6 @@ from faao_mav.autopilot.px4.guidance import (
     legs,
     level_setpoint,
 )
-from faao_mav.autopilot.px4.parameters import Px4Limits
 
 POSITION_GAIN = 0.95
 """MPC_XY_P, 1/s."""

@@ -1,4 +1,4 @@
-"""The velocity that PX4 asks for on its way along a leg, and how its trajectory follows that."""
+"""What PX4 asks of a multicopter along a leg: limits, velocity, how a trajectory follows that."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,8 @@ from math import copysign, sqrt
 from typing import NamedTuple
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.px4.parameters import Px4Limits
+from faao_mav.autopilot.body import PX4_BODY, CopterBody
+from faao_mav.autopilot.model import Model, parameter
 
 _ALIGNED = 0.98
 """The cosine of the angle between velocity and target from which an aircraft no longer counts as
@@ -25,6 +26,35 @@ other. PX4's own."""
 
 _TINY = 1e-9
 """Added to lengths, so that nothing is divided by 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class Px4Limits(Model):
+    """What bounds a multicopter's flight, in SI units; `body` is the aircraft.
+
+    In missions it climbs at MPC_Z_V_AUTO_UP, which PX4 lowers to MPC_Z_VEL_MAX_UP (mc_pos_control,
+    parameters_update); likewise down, and over the ground.
+    """
+
+    cruise_speed: float = parameter("m/s", 5.0, "MPC_XY_CRUISE", capped_by="max_speed")
+    max_speed: float = parameter("m/s", 12.0, "MPC_XY_VEL_MAX")
+    acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_HOR")
+    jerk: float = parameter("m/s^3", 4.0, "MPC_JERK_AUTO")
+    corner_gain: float = parameter("1/s", 0.5, "MPC_XY_TRAJ_P", least=0.01)
+    error_limit: float = parameter("m", 2.0, "MPC_XY_ERR_MAX")
+    acceptance_radius: float = parameter("m", 2.0, "NAV_ACC_RAD", least=0.05)
+    height_radius: float = parameter("m", 0.8, "NAV_MC_ALT_RAD", least=0.05)
+    climb_speed: float = parameter("m/s", 3.0, "MPC_Z_V_AUTO_UP", capped_by="max_climb_speed")
+    descent_speed: float = parameter("m/s", 1.5, "MPC_Z_V_AUTO_DN", capped_by="max_descent_speed")
+    climb_acceleration: float = parameter("m/s^2", 4.0, "MPC_ACC_UP_MAX")
+    descent_acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_DOWN_MAX")
+    body: CopterBody = PX4_BODY
+
+    def vertical(self, rise: float) -> tuple[float, float]:
+        """Return the greatest speed, m/s, and acceleration, m/s², of a climb by `rise`, m."""
+        if rise > 0:
+            return self.climb_speed, self.climb_acceleration
+        return self.descent_speed, self.descent_acceleration
 
 
 @dataclass(frozen=True, slots=True)

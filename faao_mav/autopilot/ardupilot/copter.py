@@ -1,4 +1,4 @@
-"""ArduCopter as a flight model: a target on its course, a controller, and an airframe."""
+"""ArduCopter: what it is, and how it flies: a target, a controller that follows it, an airframe."""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,11 +7,19 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, ramp
-from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
-from faao_mav.autopilot.ardupilot.copter.target import Target
+from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
+from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
+from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, ramp
+from faao_mav.autopilot.ardupilot.target import Target
+from faao_mav.autopilot.body import ARDUCOPTER_BODY
+from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.flight_path import STEP, Copter, FlightPath, Flown, Samples
+from faao_mav.autopilot.manners import Modes
+from faao_mav.autopilot.orbit import Orbit
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, Recommended, row, rule, table
 from faao_mav.errors import InputError
+from faao_mav.mission.command import Command
+from faao_mav.mission.item import MissionItem
 
 _MARGIN = 0.05
 """The share by which an aircraft may be slower than its target before the target's clock waits for
@@ -184,3 +192,79 @@ class _Controller:
         across = min(self._lean, max(-self._lean, turned.imag))
         most = math.sqrt(self._lean**2 - across**2)
         return complex(min(most, max(-most, turned.real)), across) * way
+
+
+_JERK, _LIVELIEST_JERK = 10.0, 20.0
+"""The recommended jerk, m/s³, and the one for bends at speed, with the greatest acceleration: its
+documented maximum. Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5,
+with a jerk of 10 4.4."""
+
+_BRAKE = 17
+_MODES = Modes(
+    rest=0,
+    mission=3,
+    hold=_BRAKE,
+    at_fence={"return": 6, "land": 9, "hold": _BRAKE},
+    guided=4,
+    not_to_arm_in=frozenset({6, 7, 9, 14, 15, _BRAKE, 18, 21, 27}),
+)
+"""COPTER_MODE of MAVLink. ArduCopter 4.7 does not arm in RTL, CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE,
+SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
+
+
+_TABLE = table(
+    *ArduCopter.parameters(),
+    row("landing_speed", "m/s", 0.5, "LAND_SPD_MS", "LAND_SPEED", least=0.05),
+    row("return_height", "m", 15.0, "RTL_ALT_M", "RTL_ALT", least=0.0, motion=False),
+    *SHARED,
+    rule("fence_options", 0, "FENCE_OPTIONS"),
+    rule("fence_type", 7, "FENCE_TYPE"),
+    row("circle_radius", "m", 10.0, "CIRCLE_RADIUS_M", "CIRCLE_RADIUS", least=0.0),
+    row("circle_rate", "rad/s", 20, "CIRCLE_RATE", least=-math.inf),
+    Parameter("rally_limit", "m", 300.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
+    rule("rally_home", 1, "RALLY_INCL_HOME"),
+)
+"""Its parameters: the newer names (SI units) first, those up to 4.7 (cm) second. Source: ArduPilot
+4.7, parameter list of Copter."""
+
+
+def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+    """Return how a NAV_LOITER_TURNS is flown (AC_Circle), turning by half of the acceleration.
+
+    Negative radii turn left, and without one a negative CIRCLE_RATE does.
+    """
+    if item.command != Command.NAV_LOITER_TURNS:
+        return None
+    given, rate = item.params[2], vehicle.value("circle_rate")
+    told = math.isfinite(given) and given != 0
+    radius = abs(given) if told else vehicle.value("circle_radius")
+    turns = item.params[0] if math.isfinite(item.params[0]) else 0.0
+    if radius <= 0 or rate == 0:
+        return None
+    most = math.sqrt(vehicle.value("acceleration") / (2 * radius))
+    return Orbit(
+        radius,
+        given > 0 if told else rate > 0,
+        turns=max(turns, 0.0),
+        turn_rate=min(abs(rate), most),
+    )
+
+
+ARDUCOPTER = ardupilot_type(
+    kind="copter",
+    name="ArduCopter",
+    mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
+    modes=_MODES,
+    hovers=True,
+    parameters=_TABLE,
+    dialect=COPTER_DIALECT,
+    whole_second_holds=True,
+    at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
+    failsafes=failsafes("arducopter"),
+    flight_model=ArduCopter.from_vehicle,
+    recommendation=Recommended(4.0, (0.5, 5.0), {"jerk": _JERK}, {"jerk": _LIVELIEST_JERK}),
+    ceilings={"max_acceleration": ("lean_angle", "acceleration")},
+    body=ARDUCOPTER_BODY,
+    orbits=_orbit,
+)
+"""ArduCopter 4.1 and later; measured on 4.7."""

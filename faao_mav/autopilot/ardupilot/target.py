@@ -5,8 +5,7 @@ import math
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot.copter.legs import StraightLegs, largest
-from faao_mav.autopilot.ardupilot.copter.parameters import ArduCopterLimits
+from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, largest
 from faao_mav.autopilot.flight_path import STEP
 
 _POINT = 1e-6

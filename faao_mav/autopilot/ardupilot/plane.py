@@ -1,4 +1,4 @@
-"""How an ArduPlane flies a mission."""
+"""ArduPlane: what it is, and how it flies a mission."""
 
 import cmath
 import math
@@ -9,9 +9,15 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
+from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
+from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.flight_path import STEP, FlightPath, Flown, Samples
+from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.model import Model, SpeedRates, parameter
+from faao_mav.autopilot.orbit import plane_orbit
+from faao_mav.autopilot.parameter import Parameter, row, rule, table
 from faao_mav.power import GRAVITY
 
 _TURN = 1.2
@@ -235,3 +241,41 @@ class _Flight:
 def _unit(way: complex) -> complex:
     """Return the direction of `way`, 0 for none."""
     return way / abs(way) if way else 0j
+
+
+_LOITER, _RTL = 12, 11
+_MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
+"""PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL."""
+
+_TABLE = table(
+    *ArduPlane.parameters(),
+    row("loiter_radius", "m", 60.0, "WP_LOITER_RAD", least=1, either_sign=True),
+    row("return_height", "m", 100.0, "RTL_ALTITUDE", "ALT_HOLD_RTL", least=-1, motion=False),
+    *SHARED,
+    rule("fence_options", 1, "FENCE_OPTIONS"),
+    rule("fence_type", 4, "FENCE_TYPE"),
+    rule("return_lands", 0, "RTL_AUTOLAND"),
+    Parameter("rally_limit", "m", 5000.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
+    rule("rally_home", 0, "RALLY_INCL_HOME"),
+)
+"""ArduPlane's parameters. A negative `loiter_radius` turns left; a `return_height` below 0 keeps
+the height at which the return begins."""
+
+ARDUPLANE = ardupilot_type(
+    kind="plane",
+    name="ArduPlane",
+    mav_types=(1,),
+    modes=_MODES,
+    hovers=False,
+    parameters=_TABLE,
+    dialect=PLANE_DIALECT,
+    returns_at_least=False,
+    at_fence=at_fence({0: "report"}),
+    failsafes=failsafes("arduplane"),
+    flight_model=ArduPlane.from_vehicle,
+    ceilings={"max_acceleration": ("roll_limit",)},
+    body=ARDUPLANE_BODY,
+    orbits=plane_orbit,
+)
+"""ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
+recommended."""
