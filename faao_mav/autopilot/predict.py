@@ -35,7 +35,12 @@ _REPEATS = 20
 _SAME_PLACE = 0.01
 """The distance, m, below which two places are one."""
 
-_HOLDING = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+_HOLDING = (
+    Command.NAV_WAYPOINT,
+    Command.NAV_SPLINE_WAYPOINT,
+    Command.NAV_LOITER_TIME,
+    Command.NAV_DELAY,
+)
 """Commands whose param1 is how long, s, what hovers waits."""
 
 _SHORTEST = 1e-3
@@ -110,7 +115,7 @@ class _Stop(NamedTuple):
 
     point: Real
     item: int
-    speed: float
+    speed: float = 0.0
     hold: float = 0.0
     spline: bool = False
     radius: float = 0.0
@@ -129,8 +134,7 @@ class _Walk:
         wind: Vector,
     ) -> None:
         self._mission, self._vehicle, self._frame = mission, vehicle, frame
-        self._step, self._wind = step, wind
-        self._type, self._vertical = vehicle.type, vehicle.vertical
+        self._step, self._wind, self._type, self._changed = step, wind, vehicle.type, vehicle
         self._model = vehicle.flight_model(frame.latitude)
         self._speed = self._model.cruise_speed
         self._longest = LONGEST_COPTER if self._type.hovers else LONGEST
@@ -142,7 +146,6 @@ class _Walk:
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
-        number, hovers = item.params[0] if item.params[0] > 0 else 0.0, self._type.hovers
         match item.command:
             case _ if (orbit := self._vehicle.orbit(item)) is not None:
                 self._circle(index, self._spot(index, item), orbit)
@@ -152,38 +155,53 @@ class _Walk:
                 self._land(index, item)
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
-            case Command.NAV_DELAY if hovers and math.isfinite(number):
-                self._towards(index, self._last, hold=number)
+            case Command.NAV_DELAY if self._type.hovers and math.isfinite(item.params[0]):
+                self._towards(index, self._last)
             case Command.DO_CHANGE_SPEED:
                 self._change_speed(item)
             case command if command in FLOWN_TO:
-                goal, radius = self._spot(index, item), item.params[1]
-                hold = number if hovers and command in _HOLDING and number < math.inf else 0.0
-                hold = math.floor(hold) if self._type.whole_second_holds else hold
-                own = command == Command.NAV_WAYPOINT and 0 < radius < math.inf
-                spline = command == Command.NAV_SPLINE_WAYPOINT
-                radius = radius if own else 0.0
-                self._towards(index, goal, hold=hold, spline=spline, radius=radius)
+                self._towards(index, self._spot(index, item))
                 self.over = command == Command.NAV_LOITER_UNLIM
 
     def track(self) -> Track:
         """Return everything flown."""
         self._fly()
-        if not self._parts:  # one sample, at rest
-            at_rest = (np.array([self._clock]), self._place[None], np.zeros((1, 3)), np.zeros(1))
-            self._parts.append(at_rest)
+        if not self._parts:
+            self._add(np.zeros(1), self._place[None], np.zeros((1, 3)), np.zeros(1))
         t, position, velocity, item = map(np.concatenate, zip(*self._parts, strict=True))
         return Track(t, position, velocity, item.astype(int), self._reached, self._frame)
 
+    def _towards(self, index: int, goal: Real) -> None:
+        """Go on to `goal` (3,), m, as the item says."""
+        item, here, hold = self._mission.items[index], self._last, 0.0
+        command, wait, radius = item.command, item.params[0], item.params[1]
+        if self._type.hovers and command in _HOLDING and 0 < wait < math.inf:
+            whole = self._type.whole_second_holds and command != Command.NAV_DELAY
+            hold = math.floor(wait) if whole else wait
+        own = command == Command.NAV_WAYPOINT and 0 < radius < math.inf
+        self._stretch.append(
+            _Stop(
+                here if np.abs(goal - here).max() <= _SAME_PLACE else goal,
+                index,
+                self._speed,
+                hold,
+                command == Command.NAV_SPLINE_WAYPOINT,
+                radius if own else 0.0,
+            )
+        )
+
+    @property
+    def _last(self) -> Real:
+        """Where the stretch ends so far, (3,) m."""
+        return self._stretch[-1].point if self._stretch else self._place
+
     def _fly(self) -> None:
         """Fly the waypoints that are waiting."""
-        stops, self._stretch = self._stretch, []
-        if not stops:
+        stops, self._stretch = [_Stop(self._place, 0), *self._stretch], []
+        if len(stops) == 1:
             return
-        home, start = self._mission.home, _Stop(self._place, 0, 0.0)
-        points, items, speeds, holds, splines, radii = (
-            np.array(column) for column in zip(start, *stops, strict=True)
-        )
+        points, items, speeds, holds, splines, radii = map(np.array, zip(*stops, strict=True))
+        home, on_its_way = self._mission.home, not self._type.hovers and len(self._parts) > 0
         path = FlightPath(
             points=points,
             speeds=speeds[1:],
@@ -193,7 +211,7 @@ class _Walk:
             longest=self._longest - self._clock,
             elevation=0.0 if home is None or math.isnan(home.altitude) else home.altitude,
             wind=self._wind,
-            entry=None if self._type.hovers or not self._parts else self._parts[-1][2][-1],
+            entry=self._parts[-1][2][-1] if on_its_way else None,
         )
         self._check_clock(self._at_least(path))
         flown = self._model.fly(path, self._step)
@@ -202,7 +220,7 @@ class _Walk:
         leg = np.searchsorted(flown.departures[1:], flown.t[kept], side="right")
         place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
         self._reached[items[1:]] = self._clock + flown.departures[1:]
-        shown = items[1:][np.minimum(leg, len(stops) - 1)]
+        shown = items[1:][np.minimum(leg, len(items) - 2)]
         self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], shown)
         self._clock, self._place = self._clock + end, place
 
@@ -210,7 +228,7 @@ class _Walk:
         """Return how long `path` takes without ramps, s."""
         ways = np.diff(path.points, axis=0)
         level, rise = np.hypot(ways[:, 0], ways[:, 1]) / path.speeds, ways[:, 2]
-        limit = np.where(rise > 0, self._vertical.climb_speed, self._vertical.descent_speed)
+        limit = np.where(rise > 0, *map(self._changed.value, ("climb_speed", "descent_speed")))
         legs = np.maximum(level, np.abs(rise) / limit)
         return float(legs.sum() + np.sum(path.holds))
 
@@ -222,30 +240,12 @@ class _Walk:
         else:
             goal = self._spot(index, item)
         if self._type.hovers:
-            climb = np.array([*self._place[:2], goal[2]])
-            self._go(index, climb, self._vertical.take_off(float(goal[2] - self._place[2])))
+            lasting = self._vehicle.climb_time(float(goal[2] - self._place[2]), take_off=True)
+            self._go(index, np.array([*self._place[:2], goal[2]]), lasting)
         if np.hypot(*(goal - self._place)[:2]) > _SAME_PLACE or not self._type.hovers:
             self._towards(index, goal)
             self._fly()
         self._reached[index] = self._clock
-
-    def _towards(
-        self,
-        index: int,
-        goal: Real,
-        *,
-        hold: float = 0.0,
-        spline: bool = False,
-        radius: float = 0.0,
-    ) -> None:
-        here = self._last
-        goal = here if np.abs(goal - here).max() <= _SAME_PLACE else goal
-        self._stretch.append(_Stop(goal, index, self._speed, hold, spline, radius))
-
-    @property
-    def _last(self) -> Real:
-        """Where the stretch ends so far, (3,) m."""
-        return self._stretch[-1].point if self._stretch else self._place
 
     def _circle(self, index: int, center: Real, orbit: Orbit) -> None:
         """Fly to the nearest place of a circle about `center` (3,), then round it.
@@ -256,22 +256,15 @@ class _Walk:
         edge = orbit.edge(center[:2], here[:2])
         self._towards(index, np.array([*edge, here[2] if orbit.climbs else center[2]]))
         self._fly()
-        rise, speed = float(center[2] - self._place[2]), orbit.speed(self._speed)
-        rate = self._vertical.climb_speed if rise > 0 else self._vertical.descent_speed
+        rise = float(center[2] - self._place[2])
+        rate = self._vehicle.value("climb_speed" if rise > 0 else "descent_speed")
         lasting = orbit.lasting(self._speed, abs(rise) / rate)
         if lasting >= _SHORTEST:
             t = self._times(lasting)
-            sense = -1.0 if orbit.clockwise else 1.0  # angles count from east to north
-            angle = math.atan2(*(edge - center[:2])[::-1]) + sense * speed / orbit.radius * t
-            out = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-            along = sense * speed * np.stack([-out[:, 1], out[:, 0]], axis=1)
-            up = self._place[2] + np.clip(np.sign(rise) * rate * t, min(rise, 0), max(rise, 0))
-            climbing = np.where(t < abs(rise) / rate, np.sign(rise) * rate, 0.0)
-            position = np.column_stack([center[:2] + orbit.radius * out, up])
-            if self._type.hovers:
-                along[[0, -1]] = 0.0
-            self._add(t, position, np.column_stack([along, climbing]), np.full(len(t), index))
-            self._clock, self._place = self._clock + lasting, position[-1]
+            turned = orbit.speed(self._speed) / orbit.radius * t  # angles count from east to north
+            out = complex(*(edge - center[:2])) * np.exp((-1j if orbit.clockwise else 1j) * turned)
+            up = self._place[2] + np.sign(rise) * np.minimum(rate * t, abs(rise))
+            self._show(index, t, np.stack([center[0] + out.real, center[1] + out.imag, up], axis=1))
         self._reached[index] = self._clock
         self.over = self.over or orbit.endless
 
@@ -290,10 +283,10 @@ class _Walk:
         rise = float(place[2] - self._place[2])
         if self._type.hovers and rise > _SAME_PLACE:
             up = np.array([*self._place[:2], place[2]])
-            self._go(index, up, self._vertical.climb(rise))
+            self._go(index, up, self._vehicle.climb_time(rise))
         self._speed = self._model.cruise_speed
         orbit = self._vehicle.orbit(CIRCLING)
-        if orbit is not None and not self._vertical.lands_on_return:
+        if orbit is not None and not self._type.hovers:
             self._circle(index, place, orbit)
         else:
             self._towards(index, place)
@@ -301,7 +294,7 @@ class _Walk:
 
     def _descend(self, index: int, ground: Real) -> None:
         self._fly()
-        self._go(index, np.append(ground, 0.0), self._vertical.descend(float(self._place[2])))
+        self._go(index, np.append(ground, 0.0), self._vehicle.landing_time(self._place[2]))
         self._reached[index] = self._clock
         self.over = True
 
@@ -309,34 +302,37 @@ class _Walk:
         """Move to `goal` at constant speed in `lasting` seconds."""
         if lasting >= _SHORTEST:
             t = self._times(lasting)
-            velocity = np.tile((goal - self._place) / lasting, (len(t), 1))
-            position = self._place + t[:, None] * velocity
-            velocity[[0, -1]] = 0.0
-            self._add(t, position, velocity, np.full(len(t), index))
-            self._clock, self._place = self._clock + lasting, goal
+            self._show(index, t, self._place + (t / lasting)[:, None] * (goal - self._place))
 
     def _times(self, lasting: float) -> Real:
         """Return when to take samples of what goes on for `lasting` seconds, s."""
         self._check_clock(lasting)
-        return np.linspace(0.0, lasting, max(2, math.ceil(lasting / self._step) + 1))
+        return np.linspace(0.0, lasting, max(3, math.ceil(lasting / self._step) + 1))
+
+    def _show(self, index: int, t: Real, position: Real) -> None:
+        """Be at `position` (n, 3), m, after `t` (n,) seconds from now."""
+        velocity = np.gradient(position, t, axis=0, edge_order=2)
+        if self._type.hovers:
+            velocity[[0, -1]] = 0.0
+        self._add(t, position, velocity, np.full(len(t), index))
+        self._clock, self._place = self._clock + float(t[-1]), position[-1]
 
     def _add(self, t: Real, position: Real, velocity: Real, item: Real) -> None:
-        first = 1 if self._parts else 0  # the instant that the last part ended with
-        if len(t) > first:
-            part = (t + self._clock, position, velocity, item)
-            self._parts.append((part[0][first:], position[first:], velocity[first:], item[first:]))
+        """Keep samples, but for an instant that the last part ended with."""
+        new = slice(1 if self._parts else 0, None)
+        if len(t[new]):
+            self._parts.append((t[new] + self._clock, position[new], velocity[new], item[new]))
 
     def _change_speed(self, item: MissionItem) -> None:
         change = self._type.dialect.speed_change(item)
         if change is None:
             return
-        if change.axis in ("climb", "descent"):
-            if change.speed is not None:
-                self._fly()
-                self._vehicle = self._vehicle.having(f"{change.axis}_speed", change.speed)
-                self._model = self._vehicle.flight_model(self._frame.latitude)
-        else:
+        if change.axis not in ("climb", "descent"):
             self._speed = self._model.cruise_speed if change.speed is None else change.speed
+        elif change.speed is not None:
+            self._fly()
+            self._changed = self._changed.having(f"{change.axis}_speed", change.speed)
+            self._model = self._changed.flight_model(self._frame.latitude)
 
     def _spot(self, index: int, item: MissionItem) -> Real:
         """Return the place of `item`, (3,) m."""

@@ -11,7 +11,6 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body, CopterBody
-from faao_mav.autopilot.flight_path import VerticalProfile
 from faao_mav.autopilot.model import Model
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.vehicle_type import (
@@ -29,6 +28,10 @@ _TYPES: dict[tuple[str, str], VehicleType] = {}
 _HELD = 0.9
 """The greatest airspeed that a plan asks of a copter, in that at which drag takes all of its lean
 limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
+
+
+LANDING_HEIGHT = 10.0
+"""The height above the ground, m, from which a landing goes on at the landing speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +88,13 @@ class Vehicle:
         """What is true of all vehicles of this autopilot and type."""
         return vehicle_type(self.autopilot, self.kind)
 
-    def value(self, key: str) -> float:
-        """Return the value of the parameter `key` in its table's unit: given, else the default."""
+    def value(self, key: str, otherwise: float | None = None) -> float:
+        """Return the value of the parameter `key` in its table's unit: given, else the default.
+
+        Of a vehicle that has no such parameter it is `otherwise`, if that is given.
+        """
+        if otherwise is not None and key not in self.type.parameters:
+            return otherwise
         return self._told(key)[0]
 
     def name_of(self, key: str) -> str:
@@ -125,25 +133,28 @@ class Vehicle:
         }
         return replace(self, parameters=kept) if len(kept) < len(self.parameters) else self
 
-    @property
-    def vertical(self) -> VerticalProfile:
-        """How it takes off, climbs, returns and lands, by its parameters."""
+    def climb_time(self, height: float, *, take_off: bool = False) -> float:
+        """Return how long a climb of `height`, m, takes from rest to rest, s; or a take-off."""
+        speed = self.value("climb_speed")
+        if not take_off:
+            return self._ramped(height, speed)
+        return self.type.spool + self._ramped(height, self.value("take_off_speed", speed))
 
-        def told(key: str, otherwise: float) -> float:
-            return self.value(key) if key in self.type.parameters else otherwise
+    def landing_time(self, height: float) -> float:
+        """Return how long the way down to the ground takes from a `height`, m, s."""
+        slow = min(max(height, 0.0), LANDING_HEIGHT)
+        landing = slow / self.value("landing_speed", 0.5)
+        return landing + self._ramped(height - slow, self.value("descent_speed"))
 
-        climb, height = self.value("climb_speed"), told("return_height", 0.0)
-        return VerticalProfile(
-            take_off_speed=told("take_off_speed", climb),
-            climb_speed=climb,
-            descent_speed=self.value("descent_speed"),
-            acceleration=told("climb_acceleration", 1.0),
-            landing_speed=told("landing_speed", 0.5),
-            return_height=height,
-            spool=self.type.spool,
-            keeps_height=self.type.returns_at_least or height < 0,
-            lands_on_return=self.type.hovers,
-        )
+    def _ramped(self, height: float, speed: float) -> float:
+        """Return how long it takes to climb or sink by `height`, m, at `speed`, m/s."""
+        ramp = speed / self.value("climb_acceleration", 1.0)
+        return height / speed + ramp if height > 0 else 0.0
+
+    def returns_at(self, height: float) -> float:
+        """Return the height, m above home, at which it returns from `height`."""
+        told = self.value("return_height", 0.0)
+        return max(height, told) if self.type.returns_at_least or told < 0 else told
 
     @property
     def fence_heights(self) -> tuple[float, float]:
@@ -167,7 +178,7 @@ class Vehicle:
         It goes to `home` (2 or more,), or to one of the mission's rally points, before it lands or
         circles there.
         """
-        rule, level = self.type.rally(self), self.vertical.returns_at(float(here[2]))
+        rule, level = self.type.rally(self), self.returns_at(float(here[2]))
         places = [frame.to_local(point.latitude, point.longitude) for point in mission.rally]
         away = [float(np.hypot(*(place - here[:2]))) for place in places]
         nearest = min(range(len(away)), key=away.__getitem__, default=None)
@@ -176,7 +187,7 @@ class Vehicle:
             return np.array([*home[:2], level])
         height = mission.rally[nearest].altitude
         if not math.isnan(height):
-            level = max(level, height) if self.vertical.lands_on_return else height
+            level = max(level, height) if self.type.hovers else height
         return np.array([*places[nearest], level])
 
     def flight_model(self, latitude: float | None = None) -> Model:

@@ -286,6 +286,5 @@ def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Ite
         instead = "" if response.keeps else f"set {name} {response.set_to}"
         level = Level.NOTE if response.keeps else Level.WARNING
         yield _found("on-fence-left", level, does=does, name=name, instead=instead)
-    height = own.vertical.return_height
-    if height > 0 and "return_height" in own.type.parameters:
+    if (height := own.value("return_height", 0.0)) > 0:
         yield _found("on-return", height=height, name=own.name_of("return_height"))

@@ -19,6 +19,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle, VehicleType
 from faao_mav.autopilot.manners import FenceAction
 from faao_mav.autopilot.predict import predict
+from faao_mav.autopilot.vehicle import LANDING_HEIGHT
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
@@ -99,19 +100,19 @@ class Flight:
             self._since = now - self._begun
         self._follows = self.on_mission = False
         vehicle, (east, north, up) = self.vehicle, self.aircraft.at(now).position
-        vertical, legs = vehicle.vertical, list[tuple[Real, float]]()
+        legs = list[tuple[Real, float]]()
         if not self.aircraft.flies(now) or action == "hold":
             self.aircraft.go(now)
             return
         if action == "return":
-            high = vertical.returns_at(up)
-            legs.append((np.array([east, north, high]), vertical.climb_speed))
+            high = vehicle.returns_at(up)
+            legs.append((np.array([east, north, high]), vehicle.value("climb_speed")))
             east, north, up = 0.0, 0.0, high
             legs.append((np.array([east, north, up]), vehicle.value("cruise_speed")))
-        if action != "return" or vertical.lands_on_return:
-            low = up if action == "sink" else min(up, vertical.landing_height)
-            legs.append((np.array([east, north, low]), vertical.descent_speed))
-            legs.append((np.array([east, north, 0.0]), vertical.landing_speed))
+        if action != "return" or self._type.hovers:
+            low = up if action == "sink" else min(up, LANDING_HEIGHT)
+            legs.append((np.array([east, north, low]), vehicle.value("descent_speed")))
+            legs.append((np.array([east, north, 0.0]), vehicle.value("landing_speed", 0.5)))
         self.aircraft.go(now, *legs)
 
     # ---- the mission and the fence
@@ -214,7 +215,7 @@ class Flight:
         if not ready or self.rules.takes_off_by_setpoints or not math.isfinite(height):
             return False
         up = np.append(self.aircraft.at(now).position[:2], height)
-        self.aircraft.go(now, (up, self.vehicle.vertical.climb_speed))
+        self.aircraft.go(now, (up, self.vehicle.value("climb_speed")))
         return True
 
     def _late(self, now: float) -> bool:

@@ -1,7 +1,6 @@
 """Rules, flight models and recommended parameters read one table for each vehicle."""
 
 import math
-from dataclasses import fields
 
 import pytest
 from hypothesis import given
@@ -54,10 +53,8 @@ def test_every_record_is_whole_and_set_by_each_of_its_names() -> None:
             assert judged.value(parameter.key) == pytest.approx(value), name
             assert vehicle.name_of(parameter.key) == name
             if each.flight_model is not None:
-                model, vertical = vehicle.flight_model(), vehicle.vertical
+                model = vehicle.flight_model()
                 assert getattr(model, parameter.key, value) == pytest.approx(value), name
-                if parameter.key in {x.name for x in fields(vertical)} - {"acceleration"}:
-                    assert getattr(vertical, parameter.key) == pytest.approx(value), name
 
 
 def test_defaults_and_what_is_recommended_are_in_the_table() -> None:
