@@ -9,7 +9,7 @@ from array import array
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import CopterBody
@@ -98,32 +98,30 @@ class Copter:
         return self.nose * complex((k + q * abs(along)) * along, (k + q * abs(across)) * across)
 
 
-class Samples:
-    """The samples of a flight: time, s, place east, north and up, m, and velocity, m/s."""
+class Flight:
+    """A flight that has taken `time`, s, so far, with samples of where it was and how fast."""
 
     def __init__(self, longest: float) -> None:
+        self.time = 0.0
         self._log, self._longest = array("d"), longest
 
-    def add(
-        self, time: float, place: complex, height: float, velocity: complex, climb: float
-    ) -> None:
-        """Keep a sample; raises `InputError` for one after the longest time that is followed."""
-        if time > self._longest:
+    def keep(self, place: complex, height: float, velocity: complex, climb: float) -> None:
+        """Keep a sample; raises `InputError` after the longest time that is followed, s."""
+        if self.time > self._longest:
             raise InputError(
                 f"the flight would take more than {self._longest:.0f} s, perhaps for the wind, or "
                 "for a waypoint that is never reached"
             )
-        self._log.extend(
-            (time, place.real, place.imag, height, velocity.real, velocity.imag, climb)
-        )
+        sample = self.time, place.real, place.imag, height, velocity.real, velocity.imag, climb
+        self._log.extend(sample)
 
-    def flown(self, arrivals: Real, departures: Real, step: float) -> Flown:
+    def flown(self, arrivals: ArrayLike, departures: ArrayLike, step: float) -> Flown:
         """Return the flight every `step` seconds up to its end."""
-        log = np.frombuffer(self._log).reshape(-1, 7)
-        t = np.arange(math.ceil(departures[-1] / step - 1e-9) + 1, dtype=float) * step
+        log, left = np.frombuffer(self._log).reshape(-1, 7), np.asarray(departures)
+        t = np.arange(math.ceil(left[-1] / step - 1e-9) + 1, dtype=float) * step
         columns = [np.interp(t, log[:, 0], column) for column in log[:, 1:].T]
         position, velocity = np.stack(columns[:3], axis=-1), np.stack(columns[3:], axis=-1)
-        return Flown(arrivals, departures, t, position, velocity)
+        return Flown(np.asarray(arrivals), left, t, position, velocity)
 
 
 _GROUND = 0.5

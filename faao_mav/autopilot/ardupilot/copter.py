@@ -13,7 +13,7 @@ from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, ra
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.flight_path import STEP, Copter, FlightPath, Flown, Samples
+from faao_mav.autopilot.flight_path import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, Recommended, row, rule, table
@@ -73,98 +73,82 @@ class ArduCopter(ArduCopterLimits):
         Raises `InputError` for speeds that are not positive and finite, and for a flight that takes
         more than `path.longest`.
         """
-        waits = path.holds
         if not np.all(np.isfinite(path.speeds) & (path.speeds > 0)):
             raise InputError("flight path: expected speeds above 0")
-        stopping = waits > 0
+        stopping, scale = path.holds > 0, self.scale
         stopping[[0, -1]] = True
-        scale = self.scale
         target = Target(path.points * scale, path.speeds, path.splines, stopping, self)
-        clock = _Clock(self, target.passed[stopping], waits[stopping])
-        samples = Samples(path.longest)
-        shown = self._follow(target.motion, clock, path, samples)
+        flight = _Flight(self, path, target, stopping)
+        shown = flight.follow(target.motion)
         arrivals = np.interp(target.passed, shown, STEP * np.arange(len(shown)))
-        arrivals[stopping] = clock.arrivals
-        flown = samples.flown(arrivals, arrivals + waits, step)
+        arrivals[stopping] = flight.arrivals
+        flown = flight.flown(arrivals, arrivals + path.holds, step)
         return replace(flown, position=flown.position / scale, velocity=flown.velocity / scale)
 
-    def _follow(
-        self, motion: Real, clock: "_Clock", path: FlightPath, samples: Samples
-    ) -> list[float]:
-        """Follow the target's `motion` (n, 9), keep `samples`, return what the clock shows at each.
+
+class _Flight(Flight):
+    """An aircraft that follows a target, whose clock slows down for it and stands at stops.
+
+    The `clock`, s, goes on at the `rate`, which follows what is asked for with the time constant
+    A/J; at stops it goes on when the flight has taken `resume` s. `arrivals`, s of the flight, are
+    when it came to the stops so far. A position controller asks for the target's acceleration plus
+    what the errors call for, up to the lean limit, where its `integral`, m/s², does not grow.
+    """
+
+    def __init__(
+        self, limits: ArduCopterLimits, path: FlightPath, target: Target, stopping: Flags
+    ) -> None:
+        super().__init__(path.longest)
+        stops, waits = target.passed[stopping].tolist(), path.holds[stopping].tolist()
+        self._limits, self._lean, self._stops = (
+            limits,
+            limits.lean,
+            list(zip(stops, waits, strict=True)),
+        )
+        self._clock, self._rate, self._resume, self.arrivals = 0.0, 1.0, waits[0], [0.0]
+        self._adapting = -math.expm1(-STEP * limits.jerk / limits.acceleration)
+        self._body = Copter(limits.body, complex(*target.motion[0, :2]), complex(*path.wind))
+        self._integral = self._body.lean
+
+    def follow(self, motion: Real) -> list[float]:
+        """Follow the target's `motion` (n, 9), return what the clock shows at each step.
 
         The target's height is the aircraft's.
         """
-        place = motion[:, ::3] + 1j * motion[:, 1::3]
-        rows = list(zip(*place.T.tolist(), *motion[:, 2:6:3].T.tolist(), strict=True))
-        body = Copter(self.body, rows[0][0], complex(*path.wind))
-        controller, shown = _Controller(self, body.lean), list[float]()
+        body, shown = self._body, list[float]()
+        target = motion[:, ::3] + 1j * motion[:, 1::3]
+        rows = list(zip(*target.T.tolist(), *motion[:, 2:6:3].T.tolist(), strict=True))
         while True:
-            k = min(int(clock.time / STEP), len(rows) - 2)
-            share = clock.time / STEP - k
+            k = min(int(self._clock / STEP), len(rows) - 2)
+            share = self._clock / STEP - k
             place, velocity, push, height, climb = (
                 a + share * (b - a) for a, b in zip(rows[k], rows[k + 1], strict=True)
             )
-            now = STEP * len(shown)
-            samples.add(now, body.place, height, body.velocity, clock.rate * climb)
-            shown.append(clock.time)
-            if not clock.runs(now):
+            self.keep(body.place, height, body.velocity, self._rate * climb)
+            shown.append(self._clock)
+            if len(self.arrivals) == len(self._stops) and self.time >= self._resume:
                 return shown
             error = place - body.place
-            clock.adapt(controller.pace(error, velocity, climb, body.velocity))
+            self._rate += (self._pace(error, velocity, climb) - self._rate) * self._adapting
             if abs(velocity) > _HEADED:
                 body.nose = velocity / abs(velocity)
-            body.move(controller.asked(error, velocity, push, body.velocity), STEP)
-            clock.run(now, now + STEP)
+            body.move(self._asked(error, velocity, push), STEP)
+            begin, self.time = self.time, STEP * len(shown)
+            self._run(max(begin, self._resume))
 
-
-class _Clock:
-    """The target's clock, which slows down for an aircraft behind and stands at stops.
-
-    Its `time`, s, goes on at the `rate`, which follows what is asked for with the time constant
-    A/J; at stops it goes on when the flight has taken `resume` s. `arrivals`, s of the flight, are
-    when it came to the stops so far.
-    """
-
-    def __init__(self, limits: ArduCopterLimits, stops: Real, waits: Real) -> None:
-        self.time, self.rate, self.resume = 0.0, 1.0, float(waits[0])
-        self.arrivals = [0.0]
-        self._adapting = -math.expm1(-STEP * limits.jerk / limits.acceleration)
-        self._stops = list(zip(stops.tolist(), waits.tolist(), strict=True))
-
-    def runs(self, now: float) -> bool:
-        """Tell whether the flight, `now` s old, is not over."""
-        return len(self.arrivals) < len(self._stops) or now < self.resume
-
-    def adapt(self, pace: float) -> None:
-        """Let the rate go towards `pace` for a step."""
-        self.rate += (pace - self.rate) * self._adapting
-
-    def run(self, begin: float, end: float) -> None:
-        """Go on from `begin` to `end`, s of the flight, but for what part of it is a stop."""
-        free = max(begin, self.resume)
-        while free < end and len(self.arrivals) < len(self._stops):
+    def _run(self, free: float) -> None:
+        """Let the clock go on from `free`, s of the flight, until now, but for what is a stop."""
+        while free < self.time and len(self.arrivals) < len(self._stops):
             stop, wait = self._stops[len(self.arrivals)]
-            if (ahead := self.time + self.rate * (end - free)) < stop:
-                self.time = ahead
+            if (ahead := self._clock + self._rate * (self.time - free)) < stop:
+                self._clock = ahead
                 return
-            free += (stop - self.time) / self.rate if self.rate > 0 else 0.0
+            free += (stop - self._clock) / self._rate if self._rate > 0 else 0.0
             self.arrivals.append(free)
-            self.time, self.resume = stop, free + wait
-            free = self.resume
+            self._clock, self._resume = stop, free + wait
+            free = self._resume
 
-
-class _Controller:
-    """The position controller: what it asks of the aircraft.
-
-    It asks for the target's acceleration plus what the errors call for, up to the lean limit, where
-    the `integral`, m/s², does not grow.
-    """
-
-    def __init__(self, limits: ArduCopterLimits, integral: complex) -> None:
-        self._integral, self._limits, self._lean = integral, limits, limits.lean
-
-    def pace(self, error: complex, target: complex, climb: float, velocity: complex) -> float:
+    def _pace(self, error: complex, target: complex, climb: float) -> float:
         """Return the rate asked of the target's clock, 0 to 1.
 
         It is the aircraft's speed along the target's, less the position error times its gain, over
@@ -173,25 +157,25 @@ class _Controller:
         square = abs(target) ** 2 + climb**2
         if square <= 1e-9:
             return 1.0
-        kept = (velocity - self._limits.position_gain * error) * target.conjugate()
+        kept = (self._body.velocity - self._limits.position_gain * error) * target.conjugate()
         return min(max(_MARGIN + (kept.real + climb**2) / square, 0.0), 1.0)
 
-    def asked(self, error: complex, target: complex, push: complex, velocity: complex) -> complex:
+    def _asked(self, error: complex, target: complex, push: complex) -> complex:
         """Return the acceleration that is asked for, m/s²; `push` is the target's."""
-        limits, held = self._limits, self._integral
-        lack = target + limits.position_gain * error - velocity
+        limits, held, most = self._limits, self._integral, self._lean
+        lack = target + limits.position_gain * error - self._body.velocity
         asked = push + limits.velocity_gain * lack + held
         self._integral += limits.velocity_integral * lack * STEP
-        if abs(asked) <= self._lean:
+        if abs(asked) <= most:
             return asked
         self._integral *= abs(held) / max(abs(held), abs(self._integral), 1e-9)
         if abs(target) < 1e-6:
-            return asked * self._lean / abs(asked)
+            return asked * most / abs(asked)
         way = target / abs(target)
         turned = asked * way.conjugate()  # what is across the target's way comes first
-        across = min(self._lean, max(-self._lean, turned.imag))
-        most = math.sqrt(self._lean**2 - across**2)
-        return complex(min(most, max(-most, turned.real)), across) * way
+        across = min(most, max(-most, turned.imag))
+        along = math.sqrt(most**2 - across**2)
+        return complex(min(along, max(-along, turned.real)), across) * way
 
 
 _JERK, _LIVELIEST_JERK = 10.0, 20.0

@@ -13,7 +13,7 @@ from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
 from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.flight_path import STEP, FlightPath, Flown, Samples
+from faao_mav.autopilot.flight_path import STEP, Flight, FlightPath, Flown
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.model import Model, SpeedRates, parameter
 from faao_mav.autopilot.orbit import plane_orbit
@@ -129,11 +129,11 @@ class ArduPlane(Model):
             arrivals.append(flight.time)
         if len(arrivals) > 1:
             flight.move(len(arrivals) - 1, step)  # the last sample is up to a step later
-        return flight.samples.flown(np.array(arrivals), np.array(arrivals), step)
+        return flight.flown(arrivals, arrivals, step)
 
 
-class _Flight:
-    """A flight, its samples kept.
+class _Flight(Flight):
+    """A flight by ArduPlane.
 
     Guidance is Park, Deyst and How's (AIAA 2004-4900) in ArduPilot's form: with damping ζ and
     period T the aircraft aims at a point L = ζ T V / π ahead on its track, by the lateral
@@ -148,6 +148,7 @@ class _Flight:
     """
 
     def __init__(self, plane: ArduPlane, path: FlightPath) -> None:
+        super().__init__(path.longest)
         self._plane, self._path, self._wind = plane, path, complex(*path.wind)
         self._places = [complex(east, north) for east, north in path.points[:, :2].tolist()]
         self._heights: list[float] = path.points[:, 2].tolist()
@@ -168,8 +169,7 @@ class _Flight:
             airspeed = complex(east, north) - self._wind
             self._demand = plane.true_airspeed(0.0, altitude)
         self._airspeed, self._heading = max(abs(airspeed), _SLOWEST), cmath.phase(airspeed)
-        self.time, self.samples = 0.0, Samples(path.longest)
-        self._keep()
+        self.keep(self._place, self._height, self._velocity, self._climb)
 
     def arrive(self, k: int) -> None:
         """Fly along the leg to point `k` until that is reached."""
@@ -194,9 +194,6 @@ class _Flight:
     def _velocity(self) -> complex:
         """The velocity over ground, m/s."""
         return cmath.rect(self._airspeed, self._heading) + self._wind
-
-    def _keep(self) -> None:
-        self.samples.add(self.time, self._place, self._height, self._velocity, self._climb)
 
     def _aim(self, k: int) -> tuple[complex, float]:
         """Return the direction to aim in on the leg to point `k`, and the height to be at, m."""
@@ -235,7 +232,7 @@ class _Flight:
         self._place += (through_air + self._wind) * step
         self._heading += change
         self.time += step
-        self._keep()
+        self.keep(self._place, self._height, self._velocity, self._climb)
 
 
 def _unit(way: complex) -> complex:

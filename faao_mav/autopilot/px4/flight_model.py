@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.flight_path import STEP, Copter, FlightPath, Flown, Samples
+from faao_mav.autopilot.flight_path import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.px4.guidance import (
     Axis,
     GuidedLeg,
@@ -132,7 +132,7 @@ class Px4(Px4Limits):
         flight = _Flight(self, path)
         arrivals, departures = [0.0], [holds[0] + SWITCH_DELAY if holds[0] > 0 else 0.0]
         flight.time = departures[0]
-        flight.keep()
+        flight.keep_now()
         for leg in route:
             flight.arrive(leg)
             arrivals.append(flight.time)
@@ -140,30 +140,29 @@ class Px4(Px4Limits):
             flight.stay(leg, departures[-1])
         if route:
             flight.stay(route[-1], departures[-1] + max(step, STEP))
-        return flight.samples.flown(np.array(arrivals), np.array(departures), step)
+        return flight.flown(arrivals, departures, step)
 
 
-class _Flight:
-    """A flight along legs, its samples kept.
+class _Flight(Flight):
+    """A flight along legs.
 
     A trajectory, `axes` east, north and up, is followed by the aircraft across the ground; its
     height is the trajectory's.
     """
 
     def __init__(self, limits: Px4Limits, path: FlightPath) -> None:
+        super().__init__(path.longest)
         self._limits = limits
         self._axes = [Axis(each) for each in path.points[0].tolist()]
         self._climbs = float(np.ptp(path.points[:, 2])) > 0
         self._body = Copter(limits.body, complex(*path.points[0, :2]))
         self._integral, self._remembered, self._pace = 0j, 0.0, 1.0
-        self.time, self.samples = 0.0, Samples(path.longest)
-        self.keep()
+        self.keep_now()
 
-    def keep(self) -> None:
+    def keep_now(self) -> None:
         """Keep where the aircraft is now."""
         up, body = self._axes[2], self._body
-        climb = self._pace * up.velocity
-        self.samples.add(self.time, body.place, up.position, body.velocity, climb)
+        self.keep(body.place, up.position, body.velocity, self._pace * up.velocity)
 
     def arrive(self, leg: GuidedLeg) -> None:
         """Fly along `leg` until its end is reached."""
@@ -217,7 +216,7 @@ class _Flight:
         self._integral += integral * lack * step
         body.move(asked, step)
         self.time += step
-        self.keep()
+        self.keep_now()
 
     def _paced(self, lag: complex, velocity: complex) -> float:
         """Return the rate of the trajectory's clock: 1 less the `lag`'s share of MPC_XY_ERR_MAX.
