@@ -69,6 +69,15 @@ STEP = 0.1
 """The longest step of a flight, s: the one that the models were calibrated with."""
 
 
+TINY = 1e-9
+"""What is shorter, m, has no direction."""
+
+
+def unit(way: complex) -> complex:
+    """Return the direction of `way`, 0 for none."""
+    return way / abs(way) if abs(way) > TINY else 0j
+
+
 class Copter:
     """A copter that leans with a lag, and at which the air drags, which moves at `wind`, m/s.
 

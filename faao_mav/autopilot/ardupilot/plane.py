@@ -13,7 +13,7 @@ from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
 from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.flight_path import STEP, Flight, FlightPath, Flown
+from faao_mav.autopilot.flight_path import STEP, Flight, FlightPath, Flown, unit
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.model import Model, SpeedRates, parameter
 from faao_mav.autopilot.orbit import plane_orbit
@@ -160,7 +160,7 @@ class _Flight(Flight):
         self._bank, self._demand, self._rates = 0.0, self._speeds[0], plane.speed_rates
         if path.entry is None:
             moves = np.diff(np.array(self._places))
-            way = _unit(complex(moves[moves != 0][0])) if moves.any() else 1j
+            way = unit(complex(moves[moves != 0][0])) if moves.any() else 1j
             across = (self._wind * way.conjugate()).imag / self._demand
             against = math.asin(min(max(across, -1.0), 1.0))  # as far as it can
             airspeed = way * cmath.rect(self._demand, -against)
@@ -178,7 +178,7 @@ class _Flight(Flight):
         if k + 1 < len(self._places):
             onward = self._places[k + 1] - self._places[k]
             turn = min(abs(cmath.phase(before.conjugate() * onward)) / (pi / 2), 1.0)
-        while (away := self._away(k, _unit(before), turn)) > 0:
+        while (away := self._away(k, unit(before), turn)) > 0:
             self.move(k, min(STEP, max(away / abs(self._velocity), _SHORTEST)))
         self.move(k, _NOTICED)
 
@@ -200,7 +200,7 @@ class _Flight(Flight):
         start, end = self._places[k - 1], self._places[k]
         if start == end or (k == 1 and self._path.entry is not None):
             return end - self._place, self._heights[k]
-        way = _unit(end - start)
+        way = unit(end - start)
         offset = (self._place - start) * way.conjugate()
         sine = offset.imag / (self._plane.look_ahead * abs(self._velocity))
         sine = min(max(sine, -_INTERCEPT), _INTERCEPT)
@@ -233,11 +233,6 @@ class _Flight(Flight):
         self._heading += change
         self.time += step
         self.keep(self._place, self._height, self._velocity, self._climb)
-
-
-def _unit(way: complex) -> complex:
-    """Return the direction of `way`, 0 for none."""
-    return way / abs(way) if way else 0j
 
 
 _LOITER, _RTL = 12, 11

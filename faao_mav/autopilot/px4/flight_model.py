@@ -9,6 +9,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.flight_path import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.px4.guidance import (
+    NEAREST,
     Axis,
     GuidedLeg,
     Px4Limits,
@@ -60,10 +61,6 @@ time. Chosen; what a change costs is not measured."""
 _SLOWEST = 1.5
 """The least speed that is commanded, m/s. Measured: an aircraft that is half a metre off comes half
 a metre sooner or later to its waypoint, a second at 0.5 m/s."""
-
-_NEAREST = 0.05
-"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at
-such a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
 
 _SHORTEST = 2e-3
 """The shortest step towards an arrival, s. Chosen."""
@@ -124,13 +121,9 @@ class Px4(Px4Limits):
         is then within its radius and may still be braking. Raises `InputError` for a flight of more
         than `path.longest` s: only flying tells how long it circles round a small radius.
         """
-        speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
-        radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)
-        holds = path.holds.tolist()
-        speeds, radii = np.minimum(speeds, self.max_speed), np.maximum(radii, _NEAREST)
-        route = legs(self, path.points, radii, speeds, holds)
+        route, hold = legs(self, path), float(path.holds[0])
         flight = _Flight(self, path)
-        arrivals, departures = [0.0], [holds[0] + SWITCH_DELAY if holds[0] > 0 else 0.0]
+        arrivals, departures = [0.0], [hold + SWITCH_DELAY if hold > 0 else 0.0]
         flight.time = departures[0]
         flight.keep_now()
         for leg in route:
@@ -181,7 +174,7 @@ class _Flight(Flight):
     def _away(self, leg: GuidedLeg) -> float:
         """Return how far the aircraft is from being accepted at the end, m; 0 and less is in."""
         up = abs(self._axes[2].position - leg.height)
-        nearest = max(self._limits.height_radius, _NEAREST)
+        nearest = max(self._limits.height_radius, NEAREST)
         return max(abs(self._body.place - leg.target) - leg.radius, up - nearest)
 
     def _move(self, leg: GuidedLeg, step: float) -> None:

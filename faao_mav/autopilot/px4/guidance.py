@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import copysign, sqrt
 from typing import NamedTuple
 
-from faao_mav.arrays import Real
+import numpy as np
+
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
+from faao_mav.autopilot.flight_path import TINY, FlightPath, unit
 from faao_mav.autopilot.model import Model, parameter
 
 _ALIGNED = 0.98
@@ -24,8 +25,9 @@ _SLOW = 0.5
 """The least speed, m/s, to which the slower of the horizontal and the vertical motion holds up the
 other. PX4's own."""
 
-_TINY = 1e-9
-"""Added to lengths, so that nothing is divided by 0."""
+NEAREST = 0.05
+"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at
+such a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,18 @@ class Px4Limits(Model):
     climb_acceleration: float = parameter("m/s^2", 4.0, "MPC_ACC_UP_MAX")
     descent_acceleration: float = parameter("m/s^2", 3.0, "MPC_ACC_DOWN_MAX")
     body: CopterBody = PX4_BODY
+
+    def stopping_speed(
+        self, distance: float, final: float = 0.0, acceleration: float | None = None
+    ) -> float:
+        """Return the speed from which PX4 trusts itself to reach `final` m/s within `distance` m.
+
+        v = (-b + sqrt(b² + 8 a d + 4 v_f²)) / 2 with b = 4 a² / j, at least v_f.
+        """
+        a = self.acceleration if acceleration is None else acceleration
+        b = 4 * a * a / self.jerk
+        speed = (sqrt(b * b + 8 * a * distance + 4 * final * final) - b) / 2
+        return max(speed, final)
 
     def vertical(self, rise: float) -> tuple[float, float]:
         """Return the greatest speed, m/s, and acceleration, m/s², of a climb by `rise`, m."""
@@ -79,16 +93,6 @@ class GuidedLeg:
     exit_climb: float
 
 
-def stopping_speed(jerk: float, acceleration: float, distance: float, final: float = 0.0) -> float:
-    """Return the speed from which PX4 trusts itself to reach `final` m/s within `distance` m.
-
-    v = (-b + sqrt(b² + 8 a d + 4 v_f²)) / 2 with b = 4 a² / j, at least v_f.
-    """
-    b = 4 * acceleration * acceleration / jerk
-    speed = (sqrt(b * b + 8 * acceleration * distance + 4 * final * final) - b) / 2
-    return max(speed, final)
-
-
 def corner_speed(limits: Px4Limits, radius: float, cosine: float) -> float:
     """Return how fast PX4 passes a waypoint of acceptance `radius`, m, where it turns, m/s.
 
@@ -98,46 +102,29 @@ def corner_speed(limits: Px4Limits, radius: float, cosine: float) -> float:
     return sqrt(limits.corner_gain * limits.acceleration * radius * half_turn)
 
 
-def _unit(way: complex) -> complex:
-    """Return the direction of `way`, 0 for none."""
-    return way / abs(way) if abs(way) > _TINY else 0j
+def legs(limits: Px4Limits, path: FlightPath) -> list[GuidedLeg]:
+    """Return the legs of `path`.
 
-
-def legs(
-    limits: Px4Limits, points: Real, radii: Real, speeds: Real, holds: Sequence[float]
-) -> list[GuidedLeg]:
-    """Return the legs between `points` (m, 3), m - 1 of them.
-
-    `radii` are (m,), `speeds` (m - 1,), `holds` (m,). Only the waypoint after the target is
-    looked at: the aircraft must be able to stop there, and it stops at the target if there is
-    none, if it is told to hold, or if the next waypoint lies within the acceptance radius. It goes
-    on climbing there if the next leg does.
+    Only the waypoint after the target is looked at: the aircraft must be able to stop there, and it
+    stops at the target if there is none, if it is told to hold, or if the next waypoint lies within
+    the acceptance radius. It goes on climbing there if the next leg does.
     """
-    places = [complex(east, north) for east, north, _ in points.tolist()]
-    heights = points[:, 2].tolist()
-    moves = [end - start for start, end in pairwise(places)] + [0j]
-    rises = [end - start for start, end in pairwise(heights)] + [0.0]
-    result = []
-    for k, (speed, radius) in enumerate(zip(speeds.tolist(), radii[1:].tolist(), strict=True)):
-        following, holding = abs(moves[k + 1]), holds[k + 1] > 0
-        passable = following > 1e-3 and following >= radius and not holding
-        climbs_on = rises[k] * rises[k + 1] > 0 and not holding
-        ahead = stopping_speed(limits.jerk, limits.acceleration, following)
-        result.append(
-            GuidedLeg(
-                origin=places[k],
-                target=places[k + 1],
-                height=heights[k + 1],
-                along=_unit(moves[k]),
-                onward=_unit(moves[k + 1]),
-                speed=speed,
-                radius=radius,
-                hold=max(holds[k + 1], 0.0),
-                exit_speed=min(ahead, speed) if passable else 0.0,
-                exit_climb=limits.vertical(rises[k])[0] if climbs_on else 0.0,
-            )
-        )
-    return result
+    speeds = np.where(path.speeds > 0, path.speeds, limits.cruise_speed)
+    speeds = np.minimum(speeds, limits.max_speed)
+    radii = np.where(path.radii > 0, path.radii, limits.acceptance_radius)[1:]
+    radii = np.maximum(radii, NEAREST)
+    places, heights = path.points[:, 0] + 1j * path.points[:, 1], path.points[:, 2]
+    moves, rises = np.append(np.diff(places), 0j), np.append(np.diff(heights), 0.0)
+    following, holding = np.abs(moves[1:]), path.holds[1:] > 0
+    ahead = np.array([limits.stopping_speed(each) for each in following.tolist()])
+    passable = (following > 1e-3) & (following >= radii) & ~holding
+    climbs_on = (rises[:-1] * rises[1:] > 0) & ~holding
+    climbs = np.where(rises[:-1] > 0, limits.climb_speed, limits.descent_speed)
+    ways = moves / np.maximum(np.abs(moves), TINY)
+    where = places[:-1], places[1:], heights[1:], ways[:-1], ways[1:]
+    exits = np.minimum(ahead, speeds) * passable, climbs * climbs_on
+    how = speeds, radii, np.maximum(path.holds[1:], 0.0), *exits
+    return [GuidedLeg(*each) for each in zip(*(x.tolist() for x in (*where, *how)), strict=True)]
 
 
 def headed(limits: Px4Limits, leg: GuidedLeg, place: complex) -> GuidedLeg:
@@ -153,7 +140,7 @@ def headed(limits: Px4Limits, leg: GuidedLeg, place: complex) -> GuidedLeg:
     if not leg.along:
         return leg
     if way.real > abs(leg.target - leg.origin):
-        return replace(leg, along=_unit(leg.target - place))
+        return replace(leg, along=unit(leg.target - place))
     if way.real < 0 and abs(way) > leg.radius:
         target = leg.origin
     elif abs(way.imag) > leg.radius:
@@ -162,8 +149,8 @@ def headed(limits: Px4Limits, leg: GuidedLeg, place: complex) -> GuidedLeg:
         return leg
     following, exit_speed = abs(leg.target - target), 0.0
     if following >= leg.radius:
-        exit_speed = min(stopping_speed(limits.jerk, limits.acceleration, following), leg.speed)
-    along = _unit(target - place)
+        exit_speed = min(limits.stopping_speed(following), leg.speed)
+    along = unit(target - place)
     return replace(leg, target=target, along=along, onward=leg.along, exit_speed=exit_speed)
 
 
@@ -178,20 +165,20 @@ def level_setpoint(
     is passed with a corner's speed, at most the leg's `exit_speed`.
     """
     offset = leg.target - place
-    distance = abs(offset) + _TINY
+    distance = abs(offset) + TINY
     direction = offset / distance
     corner = corner_speed(limits, leg.radius, (direction * leg.onward.conjugate()).real)
     passing = min(corner, leg.exit_speed)
-    slowing = stopping_speed(limits.jerk, limits.acceleration, distance, passing)
+    slowing = limits.stopping_speed(distance, passing)
     allowed, speed = min(leg.speed, slowing), abs(velocity)
-    heading = (velocity * direction.conjugate()).real / (speed + _TINY)
+    heading = (velocity * direction.conjugate()).real / (speed + TINY)
     if heading >= _ALIGNED or speed <= _MOVING or distance <= leg.radius:
         return direction, allowed, allowed
     rest = offset * leg.along.conjugate()
     if rest.real > 0:
         reach = max(leg.radius, _LOOKAHEAD)
         aim = complex(sqrt(max(reach * reach - rest.imag * rest.imag, 0.0)), rest.imag)
-        direction = _unit(aim * leg.along)
+        direction = unit(aim * leg.along)
     return direction, min(allowed, remembered), remembered
 
 
@@ -205,8 +192,8 @@ def climb_setpoint(
     """
     rise = leg.height - height
     fastest, acceleration = limits.vertical(rise)
-    left, distance = abs(rise) + _TINY, distance + _TINY
-    climb = min(fastest, stopping_speed(limits.jerk, acceleration, left, leg.exit_climb))
+    left, distance = abs(rise) + TINY, distance + TINY
+    climb = min(fastest, limits.stopping_speed(left, leg.exit_climb, acceleration))
     vertical = min(climb, max(speed, _SLOW) * left / distance)
     speed = min(speed, max(climb, _SLOW) * distance / left)
     return speed, copysign(vertical, rise)
@@ -241,7 +228,7 @@ def follow(
         a = axis.acceleration
         rest = setpoint - axis.velocity - a * abs(a) / (2 * jerk)
         start = a if rest >= 0 else -a
-        square = _TINY**2 + jerk * abs(rest) + max(start, 0.0) ** 2
+        square = TINY**2 + jerk * abs(rest) + max(start, 0.0) ** 2
         peak = min(sqrt(square), limit)
         ramps.append((start, square, peak + square / peak - start))
     total = max([ramp[-1] for ramp in ramps])
