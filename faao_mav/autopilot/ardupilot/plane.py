@@ -159,8 +159,7 @@ class _Flight(Flight):
         self._place, self._height, self._climb = self._places[0], self._heights[0], 0.0
         self._bank, self._demand, self._rates = 0.0, self._speeds[0], plane.speed_rates
         if path.entry is None:
-            moves = np.diff(np.array(self._places))
-            way = unit(complex(moves[moves != 0][0])) if moves.any() else 1j
+            way = next(filter(None, map(unit, np.diff(self._places).tolist())), 1j)
             across = (self._wind * way.conjugate()).imag / self._demand
             against = math.asin(min(max(across, -1.0), 1.0))  # as far as it can
             airspeed = way * cmath.rect(self._demand, -against)
