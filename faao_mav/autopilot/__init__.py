@@ -5,10 +5,10 @@ The four vehicles that are known are registered here; `register` adds another.
 
 from faao_mav.autopilot.ardupilot.copter import ARDUCOPTER as ARDUCOPTER
 from faao_mav.autopilot.ardupilot.plane import ARDUPLANE as ARDUPLANE
-from faao_mav.autopilot.flight_path import FlightPath as FlightPath
-from faao_mav.autopilot.flight_path import Flown as Flown
-from faao_mav.autopilot.flight_path import Track as Track
+from faao_mav.autopilot.model import FlightPath as FlightPath
+from faao_mav.autopilot.model import Flown as Flown
 from faao_mav.autopilot.model import Model as Model
+from faao_mav.autopilot.model import Track as Track
 from faao_mav.autopilot.px4 import PX4_COPTER as PX4_COPTER
 from faao_mav.autopilot.px4 import PX4_PLANE as PX4_PLANE
 from faao_mav.autopilot.vehicle import Vehicle as Vehicle

@@ -12,7 +12,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.dialect import name_of
-from faao_mav.autopilot.flight_path import LONGEST, FlightPath, Track
+from faao_mav.autopilot.model import LONGEST, FlightPath, Track
 from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.autopilot.vehicle import Vehicle
 from faao_mav.errors import InputError

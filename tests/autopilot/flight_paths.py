@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from faao_mav.autopilot import Model
-from faao_mav.autopilot.flight_path import FlightPath
+from faao_mav.autopilot.model import FlightPath
 
 
 def path_of(

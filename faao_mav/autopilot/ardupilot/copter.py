@@ -13,8 +13,8 @@ from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, ra
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.flight_path import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.manners import Modes
+from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, Recommended, row, rule, table
 from faao_mav.errors import InputError

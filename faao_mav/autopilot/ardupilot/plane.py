@@ -13,9 +13,17 @@ from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
 from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.flight_path import STEP, Flight, FlightPath, Flown, unit
 from faao_mav.autopilot.manners import Modes
-from faao_mav.autopilot.model import Model, SpeedRates, parameter
+from faao_mav.autopilot.model import (
+    STEP,
+    Flight,
+    FlightPath,
+    Flown,
+    Model,
+    SpeedRates,
+    parameter,
+    unit,
+)
 from faao_mav.autopilot.orbit import plane_orbit
 from faao_mav.autopilot.parameter import Parameter, row, rule, table
 from faao_mav.power import GRAVITY

@@ -6,7 +6,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, largest
-from faao_mav.autopilot.flight_path import STEP
+from faao_mav.autopilot.model import STEP
 
 _POINT = 1e-6
 """The length, m, below which a leg is none: its end counts as reached where it begins."""

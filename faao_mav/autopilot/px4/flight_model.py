@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.flight_path import STEP, Copter, Flight, FlightPath, Flown
+from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.px4.guidance import (
     NEAREST,
     Axis,

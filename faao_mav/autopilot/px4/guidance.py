@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
-from faao_mav.autopilot.flight_path import TINY, FlightPath, unit
-from faao_mav.autopilot.model import Model, parameter
+from faao_mav.autopilot.model import TINY, FlightPath, Model, parameter, unit
 
 _ALIGNED = 0.98
 """The cosine of the angle between velocity and target from which an aircraft no longer counts as
