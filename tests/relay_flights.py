@@ -15,7 +15,7 @@ from faao_mav.plan import (
 )
 from faao_mav.schedule import Conversion, convert
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.initial_route import initial_route
+from faao_mav.schedule.route import initial_route
 
 STEADY = settings(derandomize=True, deadline=None, max_examples=80)
 """The same examples on every run."""

@@ -15,13 +15,12 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.copter_scheduler import CopterScheduler
-from faao_mav.schedule.initial_route import initial_route, slowest_leg
 from faao_mav.schedule.plane_scheduler import PlaneScheduler
-from faao_mav.schedule.route import DIGITS
+from faao_mav.schedule.route import initial_route, slowest_leg
 from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
 from faao_mav.schedule.transit import ROUNDING, check_transit
-from faao_mav.schedule.waypoints import SLOWEST
+from faao_mav.schedule.waypoints import DIGITS, SLOWEST
 
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
 

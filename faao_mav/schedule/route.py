@@ -1,21 +1,22 @@
-"""The relay route: waypoints, when the plan passes them, and what the mission commands there."""
+"""The relay route: waypoints, when the plan passes them, and what the mission commands there.
+
+The initial route has few legs at the plan's mean speeds, and hovers as waits. Nothing in it knows
+how the vehicle speeds up or turns: the schedulers fit it to the predicted flight.
+"""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.autopilot import FlightPath
-from faao_mav.plan import Vector
+from faao_mav.autopilot import FlightPath, Model
+from faao_mav.plan import Plan, Vector
+from faao_mav.schedule.waypoints import DIGITS, LEG_SHARE, Waypoint, hovers_and_ends, simplify
 from faao_mav.vector import lengths
 
-DIGITS = 3
-"""Decimals of all values of a route, in m, m/s and s, as they are flown and sent.
-
-Far above the noise of a processor's rounding (1e-9 and less), far below what a flight shows; with
-speeds of two, 300 s of flight end 0.25 s off.
-"""
+_MOVING = 0.5  # the speed at an end of a plan, m/s, above which there is a run-in; chosen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,3 +133,117 @@ def sent_speeds(speeds: Real, max_speed: float) -> Real:
     scale = 10**DIGITS
     limit = np.floor(max_speed * scale + 1e-6) / scale or max_speed
     return np.minimum(np.round(speeds, DIGITS), limit)
+
+
+def initial_route(t: Real, w: Real, plan: Plan) -> Route:
+    """Return waypoints, waits and speeds that follow the trajectory.
+
+    The polyline through the waypoints passes every sample of `w` within
+    `plan.mission.path_tolerance`. Hovers are one waypoint with a wait of whole seconds; what
+    rounding leaves over is carried to the next wait. Each leg's speed is its length over its
+    planned duration, to 0.001 m/s, at most `plan.max_ground_speed`: the time that it takes to
+    speed up and slow down is not allowed for.
+
+    `t` (n,) s, n >= 2, increasing, are the times of the slots, `w` (n, 2) the local east-north
+    positions at those times, metres.
+    """
+    slowest, tolerance = slowest_leg(plan), plan.mission.path_tolerance
+    fixed = hovers_and_ends(t, w, tolerance, slowest)
+    waypoints = [fixed[0]]
+    for start, stop in pairwise(fixed):
+        stretch = slice(start.last, stop.first + 1)
+        path = w[stretch].copy()
+        path[0], path[-1] = start.position, stop.position
+        inner = simplify(path, LEG_SHARE * tolerance)
+        waypoints += [Waypoint(start.last + k, start.last + k, path[k]) for k in inner]
+        waypoints.append(stop)
+    return _timed(t, waypoints, slowest, plan.max_ground_speed)
+
+
+def slowest_leg(plan: Plan) -> float:
+    """Return the least speed that the plan's vehicle is commanded for a leg, m/s.
+
+    Where the plan is slower it waits. It is half of `max_speed` at most.
+    """
+    return min(plan.aircraft.flight_model().slowest, plan.vehicle.max_speed / 2)
+
+
+def with_run_in(route: Route, t: Real, w: Real, legs: Model, max_speed: float) -> Route:
+    """Return `route` with a leg on which the aircraft reaches the plan's first speed before w_I.
+
+    Likewise with one after w_F, so that the aircraft does not brake before it. Ends at which the
+    plan waits, or is slower than 0.5 m/s, get none. `t` (n,) s, `w` (n, 2) m.
+    """
+    if len(route.positions) < 2:
+        return route
+    for end, velocity in zip((0, -1), _end_velocities(t, w), strict=True):
+        speed = float(lengths(velocity))
+        if speed <= _MOVING or route.departures[end] > route.arrivals[end]:
+            continue
+        flown, outward = min(speed, max_speed), 1.0 if end else -1.0
+        length = legs.run_in * float(legs.shortest_leg(np.array([flown]))[0])
+        route = route.insert(
+            np.array([len(route.positions) if end else 0]),
+            (route.positions[end] + outward * (velocity / speed * length))[None],
+            np.array([route.arrivals[end] + outward * length / flown]),
+            np.array([speed]),
+        )
+    return route
+
+
+def set_out(t: Real, w: Real, plan: Plan) -> float:
+    """Return when the trajectory leaves w_I, s: the end of the initial route's first hover.
+
+    `t` (n,) s, `w` (n, 2) m.
+    """
+    tolerance = plan.mission.path_tolerance
+    return float(t[hovers_and_ends(t, w, tolerance, slowest_leg(plan))[0].last])
+
+
+def begins_at_speed(t: Real, w: Real) -> bool:
+    """Tell whether the plan `t` (n,) s, `w` (n, 2) m begins faster than 0.5 m/s."""
+    return float(lengths(_end_velocities(t, w)[0])) > _MOVING
+
+
+def _timed(t: Real, waypoints: list[Waypoint], slowest: float, max_speed: float) -> Route:
+    """Return the route with the speeds and waits that keep the plan's times without ramps."""
+    positions = np.array([waypoint.position for waypoint in waypoints])
+    arrivals = t[[waypoint.first for waypoint in waypoints]]
+    departures = t[[waypoint.last for waypoint in waypoints]]
+    length = lengths(np.diff(positions, axis=0))
+    planned = arrivals[1:] - departures[:-1]
+    speeds = sent_speeds(np.maximum(length / planned, slowest), max_speed)
+    # Where the plan hovers, or creeps slower than is flown, there is time to wait.
+    free = departures > arrivals
+    free[1:] |= length < slowest * planned
+    waits = np.zeros(len(waypoints))
+    clock = arrivals[0]
+    for k in range(len(waypoints)):
+        if free[k]:
+            waits[k] = max(0, round(departures[k] - clock))
+        clock += waits[k]
+        if k < len(length):
+            clock += length[k] / speeds[k]
+    return Route(
+        positions=positions,
+        arrivals=arrivals,
+        departures=departures,
+        speeds=speeds,
+        waits=waits,
+        radii=np.zeros(len(waypoints)),
+        first=0,
+        last=len(waypoints) - 1,
+    )
+
+
+def _end_velocities(t: Real, w: Real) -> tuple[Real, Real]:
+    """Return the velocities (2,), m/s, at which the plan begins and ends.
+
+    Of second order: the mean over the first slot is not 0 for a plan that speeds up from rest.
+    """
+    if len(t) < 3:
+        between = (w[-1] - w[0]) / (t[-1] - t[0])
+        return between, between
+    first = np.gradient(w[:3], t[:3], axis=0, edge_order=2)[0]
+    last = np.gradient(w[-3:], t[-3:], axis=0, edge_order=2)[-1]
+    return first, last

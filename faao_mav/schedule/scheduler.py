@@ -13,11 +13,9 @@ from faao_mav.arrays import Integers, Real
 from faao_mav.autopilot import Model, Vehicle
 from faao_mav.errors import InputError
 from faao_mav.plan import Vector
-from faao_mav.schedule.initial_route import with_run_in
-from faao_mav.schedule.retimed import Retimed
-from faao_mav.schedule.route import Route, sent_speeds
+from faao_mav.schedule.route import Route, sent_speeds, with_run_in
 from faao_mav.schedule.schedule import Schedule, positions_at
-from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Unknowns, stepped
+from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Retimed, Unknowns, stepped
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.

@@ -10,7 +10,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Home
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.initial_route import initial_route
+from faao_mav.schedule.route import initial_route
 
 
 def test_the_items_of_a_mission() -> None:

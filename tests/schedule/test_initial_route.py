@@ -9,8 +9,7 @@ from relay_flights import STEADY, Trajectory, dash, dash_hover_dash, items_of, p
 from faao_mav.arrays import Real
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.initial_route import initial_route
-from faao_mav.schedule.route import Route
+from faao_mav.schedule.route import Route, initial_route
 from faao_mav.vector import distances_to_path, lengths
 
 STEP = 0.2

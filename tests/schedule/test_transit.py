@@ -16,7 +16,7 @@ from faao_mav.mission import Command, Mission
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.conversion import check_vehicle
-from faao_mav.schedule.initial_route import initial_route, with_run_in
+from faao_mav.schedule.route import initial_route, with_run_in
 from faao_mav.schedule.transit import check_transit, way_home, way_out
 
 WALL = {"polygon": [[-60, 15], [60, 15], [60, 30], [-60, 30]]}
