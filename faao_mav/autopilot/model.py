@@ -69,8 +69,7 @@ class Flown:
     velocity: Real
 
 
-_GROUND = 0.5
-"""A flight that ends lower, m above home, has landed. Chosen."""
+_GROUND = 0.5  # A flight that ends lower, m above home, has landed. Chosen.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -221,12 +220,9 @@ class Model(ABC):
         return SpeedRates()
 
 
-STEP = 0.1
-"""The longest step of a flight, s: the one that the models were calibrated with."""
-
-
-TINY = 1e-9
-"""What is shorter, m, has no direction."""
+STEP = 0.1  # The longest step of a flight, s: the one that the models were calibrated with.
+SHORTEST = 2e-3  # The shortest step towards a waypoint, s. Chosen.
+TINY = 1e-9  # What is shorter, m, has no direction.
 
 
 def unit(way: complex) -> complex:

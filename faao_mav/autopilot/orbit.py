@@ -1,9 +1,8 @@
 """Where items are: their heights, circles, and where a return goes when there are rally points."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,9 +57,6 @@ class Orbit:
 
 CIRCLING = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
 """How a vehicle goes on that circles where its mission or its return ends."""
-
-Orbits: TypeAlias = Callable[[ParameterValues, MissionItem], Orbit | None]
-"""How a vehicle circles at an item, None where it does not."""
 
 
 def plane_orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:

@@ -29,11 +29,8 @@ _MOST_STEPS = 2000
 """The largest number of items that are flown, repeats by DO_JUMP included. Chosen: a few seconds of
 work at most, whatever a file or a peer asks for."""
 
-_REPEATS = 20
-"""How often a jump that never ends is followed. Chosen."""
-
-_SAME_PLACE = 0.01
-"""The distance, m, below which two places are one."""
+_REPEATS = 20  # How often a jump that never ends is followed. Chosen.
+_SAME_PLACE = 0.01  # The distance, m, below which two places are one.
 
 _HOLDING = (
     Command.NAV_WAYPOINT,
@@ -43,8 +40,7 @@ _HOLDING = (
 )
 """Commands whose param1 is how long, s, what hovers waits."""
 
-_SHORTEST = 1e-3
-"""The shortest motion, s, that is worth a sample."""
+_SHORTEST = 1e-3  # The shortest motion, s, that is worth a sample.
 
 
 def predict(

@@ -196,7 +196,7 @@ class Vehicle:
         Raises `InputError` if there is no model of its type.
         """
         if self.type.flight_model is None:
-            raise InputError(self.type.unmodelled)
+            raise InputError(f"there is no model of how {self.type.name} flies {self.kind}s")
         return self.type.flight_model(self, latitude)
 
     def ceiling(self, key: str) -> tuple[float, str]:

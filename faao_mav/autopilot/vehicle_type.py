@@ -11,9 +11,10 @@ from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.failsafe import Failsafe
 from faao_mav.autopilot.manners import FenceAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.model import Model
-from faao_mav.autopilot.orbit import Orbits, RallyRule
+from faao_mav.autopilot.orbit import Orbit, RallyRule
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.item import MissionItem
 from faao_mav.power import GRAVITY
 
 OVERSPEED = 1.1
@@ -103,10 +104,9 @@ class VehicleType:
     at_fence: Callable[[ParameterValues], FenceResponse] = lambda _: FenceResponse("nothing", "")
     # How far ahead, m, it looks for its fence at a speed, m/s; 0: it acts when it is outside
     fence_ahead: Callable[[ParameterValues, Real], Real] = lambda _, speed: 0 * speed
-    # How it flies, with the latitude in degrees if that is known; None if `unmodelled` says why
-    # there is no model: no missions are made for it
+    # How it flies, with the latitude in degrees if that is known; None: there is no model, and no
+    # missions are made for it
     flight_model: Callable[[ParameterValues, float | None], Model] | None = None
-    unmodelled: str = ""
     # The parameters that suit plans; None: it flies with its own
     recommendation: Recommended | None = None
     # Parameters that a plan's "max_speed" or "max_acceleration" may not exceed for the vehicle to
@@ -118,7 +118,8 @@ class VehicleType:
     # Its flight model flies in wind: what hovers in more than it can hold as well
     models_wind: bool = False
     failsafes: tuple[Failsafe, ...] = ()  # What it does by itself on a loss
-    orbits: Orbits = lambda *_: None  # How it circles at an item
+    # How it circles at an item, None where it does not
+    orbits: Callable[[ParameterValues, MissionItem], Orbit | None] = lambda *_: None
     # Where a return goes when there are rally points
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
 

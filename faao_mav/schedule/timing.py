@@ -214,18 +214,15 @@ class Goal:
         self.t, self._w = t[samples], w[samples]
         self._weight = 1 / np.sqrt(len(samples))
 
-    def cost(self, schedule: Schedule) -> float:
-        """Return the sum of squares, m², of a flight."""
-        residuals = self._residuals(schedule.positions(self.t), schedule.late)
-        return float(residuals @ residuals)
-
-    def residuals(self, found: Retiming) -> Real:
-        """Return the residuals (r,), m, of a retimed flight."""
-        return self._residuals(found.positions, found.late)
-
-    def _residuals(self, positions: Real, late: float) -> Real:
+    def residuals(self, positions: Real, late: float) -> Real:
+        """Return the residuals (r,), m, of a flight at `positions` (n, 2) that is `late` by s."""
         apart = (positions - self._w) * self._weight
         return np.append(apart.T, LATE_WEIGHT * late)
+
+    def cost(self, schedule: Schedule) -> float:
+        """Return the sum of squares, m², of a flight."""
+        residuals = self.residuals(schedule.positions(self.t), schedule.late)
+        return float(residuals @ residuals)
 
     def slopes(self, found: Retiming, later: Real) -> Real:
         """Return what the unknowns do to the residuals, (r, k).
@@ -246,7 +243,7 @@ def stepped(goal: Goal, unknowns: Unknowns, retimed: Retimed, begin: Real) -> tu
     def flown(x: Real) -> tuple[Route, Retiming, Real, float]:
         route = unknowns.commanded(x)
         found = retimed.at(goal.t, route)
-        residuals = goal.residuals(found)
+        residuals = goal.residuals(found.positions, found.late)
         return route, found, residuals, float(residuals @ residuals)
 
     x, damping = unknowns.reached(begin, retimed.limits), 1e-3

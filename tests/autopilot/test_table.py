@@ -101,7 +101,6 @@ def test_vehicles_are_found_by_name_and_number() -> None:
     assert set(vehicle_types()) == set(TYPES)
     for each in vehicle_types():
         assert vehicle_type(each.family.key, each.kind) is each
-        assert (each.flight_model is None) == bool(each.unmodelled)
         for number in each.mav_types:
             assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each
     assert len({each.mav_autopilot for each in families().values()}) == len(families())

@@ -87,8 +87,7 @@ ARDUPILOT = AutopilotFamily(
 )
 """Manners: `MissionItemProtocol.cpp` (behaviour only), and what it did in its simulator."""
 
-_UNION = 2
-"""The bit of FENCE_OPTIONS by which being inside one of several inclusions is enough."""
+_UNION = 2  # The bit of FENCE_OPTIONS by which being inside one of several inclusions is enough.
 
 
 def _needs_one_inclusion(vehicle: ParameterValues) -> bool:
@@ -96,8 +95,7 @@ def _needs_one_inclusion(vehicle: ParameterValues) -> bool:
     return bool(int(vehicle.value("fence_options")) & _UNION)
 
 
-_AREAS = 4
-"""The bit of FENCE_TYPE by which the areas of a fence count."""
+_AREAS = 4  # The bit of FENCE_TYPE by which the areas of a fence count.
 
 
 def at_fence(actions: Mapping[int, FenceAction]) -> Callable[[ParameterValues], FenceResponse]:

@@ -9,7 +9,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
-from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, ramp
+from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.failsafe import failsafes
@@ -60,7 +60,7 @@ class ArduCopter(ArduCopterLimits):
         >>> float(ArduCopter().shortest_leg(np.array(8.0)).round(1))
         48.0
         """
-        return speed * ramp(self, speed, self.acceleration).duration
+        return speed * self.ramp(speed).duration
 
     def leg_durations(self, lengths: Real, joined: Flags) -> StraightLegs:
         """Return how long straight legs of `lengths`, m, take."""

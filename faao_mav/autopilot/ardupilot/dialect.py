@@ -22,8 +22,7 @@ from faao_mav.autopilot.dialect import (
 from faao_mav.mission.command import LANDINGS, Command, Frame
 from faao_mav.mission.item import MissionItem
 
-_HIGHEST = 83_000.0
-"""The altitude from which on items are refused, m. Read in AP_Mission."""
+_HIGHEST = 83_000.0  # The altitude from which on items are refused, m. Read in AP_Mission.
 
 _CONTINUE_AFTER_LAND = 4
 """The bit of MIS_OPTIONS by which a take-off behind a landing is flown. Measured on ArduCopter 4.7:
@@ -104,8 +103,7 @@ _COPTER_SPEEDS: dict[float, SpeedAxis] = dict(
     enumerate(("horizontal", "horizontal", "climb", "descent"))
 )
 _PLANE_SPEEDS: dict[float, SpeedAxis] = {0: "airspeed", 1: "least ground speed"}
-_PLANE_DEFAULT = -2.0
-"""The airspeed of a DO_CHANGE_SPEED that stands for the plane's own, m/s."""
+_PLANE_DEFAULT = -2.0  # The airspeed of a DO_CHANGE_SPEED that stands for the plane's own, m/s.
 
 
 def _speed_change(item: MissionItem, axes: Mapping[float, SpeedAxis]) -> SpeedChange | None:

@@ -33,16 +33,14 @@ _JERK_TIMES = 12.0
 """The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
 which none is longer than a second: the autopilot's own rule."""
 
-FASTEST = 40.0
-"""The speed, m/s, that no leg comes to. Chosen above all that is commanded."""
+FASTEST = 40.0  # The speed, m/s, that no leg comes to. Chosen above all that is commanded.
 
 _HALVINGS = 9
 """How often an interval is halved that holds what is sought, before it lies on a line between both
 ends. Chosen: of 40 m/s 0.08 are left."""
 
 
-_LEAST_INPUT_TIME = 0.1
-"""The autopilot's own lower bound of ATC_INPUT_TC, s."""
+_LEAST_INPUT_TIME = 0.1  # The autopilot's own lower bound of ATC_INPUT_TC, s.
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +89,17 @@ class ArduCopterLimits(Model):
         return max(
             2 * max(self.input_time, _LEAST_INPUT_TIME), math.pi * self.jerk / (GRAVITY * agility)
         )
+
+    def ramp(self, change: Real, acceleration: Real | float | None = None) -> "Ramp":
+        """Return ramps by `change` >= 0, m/s, within its own or another `acceleration`, m/s²."""
+        most, jerk, rise = acceleration, self.jerk, self.rise
+        if most is None:
+            most = self.acceleration
+        free = (rise + np.sqrt(rise**2 + 4 * change / jerk)) / 2
+        full = most / jerk + rise
+        steady = change > most * full
+        duration = np.where(steady, change / most + full, 2 * free) * (change > 0)
+        return Ramp(duration, np.where(steady, full, free), rise / 2)
 
     @property
     def corner(self) -> float:
@@ -150,16 +159,6 @@ class Ramp:
         return np.array([distance, np.where(late, 1 - peak * speed, peak * speed), acceleration])
 
 
-def ramp(limits: ArduCopterLimits, change: Real, acceleration: Real | float) -> Ramp:
-    """Return ramps by `change` >= 0, m/s, within an `acceleration`, m/s²."""
-    jerk, rise = limits.jerk, limits.rise
-    free = (rise + np.sqrt(rise**2 + 4 * change / jerk)) / 2
-    full = acceleration / jerk + rise
-    steady = change > acceleration * full
-    duration = np.where(steady, change / acceleration + full, 2 * free) * (change > 0)
-    return Ramp(duration, np.where(steady, full, free), rise / 2)
-
-
 @dataclass(frozen=True, eq=False)
 class StraightLegs:
     """Legs of `lengths` (m - 1,), m, along which `accelerations`, m/s², are the greatest.
@@ -181,8 +180,7 @@ class StraightLegs:
 
     def ramp(self, change: Real) -> Ramp:
         """Return ramps by `change` (..., m - 1), m/s."""
-        own = self.limits.acceleration if self.accelerations is None else self.accelerations
-        return ramp(self.limits, change, own)
+        return self.limits.ramp(change, self.accelerations)
 
     @cached_property
     def top(self) -> Real:

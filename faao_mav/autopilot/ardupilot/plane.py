@@ -15,6 +15,7 @@ from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
 from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.model import (
+    SHORTEST,
     STEP,
     Flight,
     FlightPath,
@@ -42,17 +43,13 @@ _NOTICED = 0.05
 """How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
 airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside."""
 
-_HEIGHT_TIME = 2.0
-"""The time constant with which a height is approached, s. Chosen."""
+_HEIGHT_TIME = 2.0  # The time constant with which a height is approached, s. Chosen.
 
 _CLIMB_LAG = 1.0
 """The time constant with which a climb follows what the height asks for, s. Chosen."""
 
 _SLOWEST = 1.0
 """The least airspeed with which a flight begins, m/s. Chosen: nothing is divided by 0."""
-
-_SHORTEST = 2e-3
-"""The shortest step towards a waypoint, s. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +183,7 @@ class _Flight(Flight):
             onward = self._places[k + 1] - self._places[k]
             turn = min(abs(cmath.phase(before.conjugate() * onward)) / (pi / 2), 1.0)
         while (away := self._away(k, unit(before), turn)) > 0:
-            self.move(k, min(STEP, max(away / abs(self._velocity), _SHORTEST)))
+            self.move(k, min(STEP, max(away / abs(self._velocity), SHORTEST)))
         self.move(k, _NOTICED)
 
     def _away(self, k: int, way: complex, turn: float) -> float:

@@ -28,8 +28,7 @@ from faao_mav.autopilot.vehicle_type import (
 )
 from faao_mav.geodesy import LocalFrame
 
-_RADIUS = 6_371_000.0
-"""The radius of PX4's Earth, m."""
+_RADIUS = 6_371_000.0  # The radius of PX4's Earth, m.
 
 
 def px4_mode(main: int, sub: int) -> int:
@@ -104,8 +103,7 @@ def _at_fence(vehicle: ParameterValues) -> FenceResponse:
     return response if response.keeps else replace(response, set_to="2 (hold) or 3 (return)")
 
 
-_FENCE_CHECKS = 0.2
-"""The time between two looks at the fence, s. PX4's own."""
+_FENCE_CHECKS = 0.2  # The time between two looks at the fence, s. PX4's own.
 
 
 def _fence_ahead(vehicle: ParameterValues, speed: Real) -> Real:
@@ -216,7 +214,6 @@ PX4_PLANE = _px4_type(
     modes=replace(_MODES, guided=None),
     hovers=False,
     parameters=_PLANE_TABLE,
-    unmodelled="there is no model of how PX4 flies planes",
     orbits=plane_orbit,
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
+from faao_mav.autopilot.model import SHORTEST, STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.px4.guidance import (
     NEAREST,
     Axis,
@@ -21,11 +21,8 @@ from faao_mav.autopilot.px4.guidance import (
     level_setpoint,
 )
 
-POSITION_GAIN = 0.95
-"""MPC_XY_P, 1/s."""
-
-VELOCITY_GAINS = (1.8, 0.4, 0.2)
-"""MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC."""
+POSITION_GAIN = 0.95  # MPC_XY_P, 1/s.
+VELOCITY_GAINS = (1.8, 0.4, 0.2)  # MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC.
 
 SWITCH_DELAY = 0.065
 """How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
@@ -61,9 +58,6 @@ time. Chosen; what a change costs is not measured."""
 _SLOWEST = 1.5
 """The least speed that is commanded, m/s. Measured: an aircraft that is half a metre off comes half
 a metre sooner or later to its waypoint, a second at 0.5 m/s."""
-
-_SHORTEST = 2e-3
-"""The shortest step towards an arrival, s. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +155,7 @@ class _Flight(Flight):
         """Fly along `leg` until its end is reached."""
         away, closing = self._away(leg), 0.0
         while away > 0:
-            step = min(STEP, max(away / closing, _SHORTEST)) if closing > 0 else STEP
+            step = min(STEP, max(away / closing, SHORTEST)) if closing > 0 else STEP
             self._move(leg, step)
             before, away = away, self._away(leg)
             closing = (before - away) / step

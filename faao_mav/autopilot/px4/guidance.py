@@ -14,8 +14,7 @@ _ALIGNED = 0.98
 """The cosine of the angle between velocity and target from which an aircraft no longer counts as
 turning (about 11 degrees). PX4's own."""
 
-_MOVING = 0.2
-"""The speed, m/s, from which an aircraft counts as turning. Chosen."""
+_MOVING = 0.2  # The speed, m/s, from which an aircraft counts as turning. Chosen.
 
 _LOOKAHEAD = 5.0
 """The least distance, m, at which a turning aircraft aims along its leg. PX4's own."""
