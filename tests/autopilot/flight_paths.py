@@ -1,12 +1,10 @@
 """Paths to fly."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
 
-from faao_mav.autopilot import Model
 from faao_mav.autopilot.model import FlightPath
 
 
@@ -51,20 +49,3 @@ def wandering(draw: st.DrawFn, *, shortest: float = 5.0, climbs: bool = False) -
     if climbs:
         heights = draw(st.lists(st.floats(20, 60), min_size=legs + 1, max_size=legs + 1))
     return path_of([0j, *np.cumsum(steps)], speeds, holds=holds, heights=heights)
-
-
-def bends(seed: int) -> FlightPath:
-    """Return a path of 14 legs in gentle bends, with a hold."""
-    rng = np.random.default_rng(seed)
-    turns, lengths = rng.uniform(-0.25, 0.25, 14), rng.uniform(12, 30, 14)
-    places = [0j, *np.cumsum(lengths * np.exp(1j * np.cumsum(turns)))]
-    return path_of(places, list(rng.uniform(3, 8, 14)), holds={7: 6.0})
-
-
-def roughness(model: Model, path: FlightPath, leg: int) -> float:
-    """Return how far the arrival is from a smooth function of the speed of a `leg`, s."""
-    change, one = np.linspace(-0.02, 0.02, 41), np.eye(len(path.speeds))[leg]
-    tried = [replace(path, speeds=path.speeds + each * one) for each in change]
-    arrivals = np.array([model.fly(each).arrivals[-1] for each in tried])
-    noise = arrivals - np.polyval(np.polyfit(change, arrivals, 3), change)
-    return float(abs(noise).max())
