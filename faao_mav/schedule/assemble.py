@@ -52,7 +52,8 @@ def assemble(route: Route, plan: Plan) -> Mission:
     items.append(_change_speed(commanded, axis))
     stop = SHORTEST_HOLD if vehicle.hovers else 0.0
     items += [_at(Command.NAV_WAYPOINT, place, altitude, stop) for place in out]
-    holds, delays = route.holds_and_delays(whole_seconds=vehicle.whole_second_holds)
+    holds = np.floor(route.waits) if vehicle.whole_second_holds else route.waits
+    delays = np.round(route.waits - holds, 9)
     for k, place in enumerate(places):
         speed = float(route.speeds[k - 1]) if k else commanded
         if speed != commanded:

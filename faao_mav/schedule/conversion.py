@@ -14,11 +14,9 @@ from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
-from faao_mav.schedule.copter_scheduler import CopterScheduler
-from faao_mav.schedule.plane_scheduler import PlaneScheduler
-from faao_mav.schedule.route import initial_route, slowest_leg
+from faao_mav.schedule.route import initial_route, slowest_leg, with_run_in
 from faao_mav.schedule.schedule import Schedule
-from faao_mav.schedule.scheduler import ALLOWED_ERROR, Scheduler
+from faao_mav.schedule.scheduler import ALLOWED_ERROR, CopterScheduler, PlaneScheduler, Scheduler
 from faao_mav.schedule.transit import ROUNDING, check_transit
 from faao_mav.schedule.waypoints import DIGITS, SLOWEST
 
@@ -154,7 +152,8 @@ def _convert(solution: Solution, plan: Plan) -> Conversion:
     route = initial_route(t, w, plan)
     sets = plan.candidates
     schedulers = [_scheduler(plan, t, w, _with(plan.aircraft, each)) for each in sets]
-    firsts = [scheduler.first(route) for scheduler in schedulers]
+    routes = [with_run_in(route, t, w, each.model, each.max_speed) for each in schedulers]
+    firsts = [each.first(begun) for each, begun in zip(schedulers, routes, strict=True)]
     order = sorted(range(len(firsts)), key=lambda k: firsts[k].error)
     chosen, best, rank = order[0], firsts[order[0]], (inf, inf)
     for k in order:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from faao_mav.arrays import Flags, Integers, Real
-from faao_mav.autopilot import FlightPath, Model
-from faao_mav.plan import Plan, Vector
+from faao_mav.autopilot import Model
+from faao_mav.plan import Plan
 from faao_mav.schedule.waypoints import DIGITS, LEG_SHARE, Waypoint, hovers_and_ends, simplify
 from faao_mav.vector import lengths
 
@@ -49,6 +49,13 @@ class Route:
         return lengths(np.diff(self.positions, axis=0))
 
     @property
+    def planned_speeds(self) -> Real:
+        """The speed with which the plan moves along each leg, (m - 1,), m/s; none is 0."""
+        durations = self.arrivals[1:] - self.departures[:-1]
+        speeds: Real = np.maximum(self.leg_lengths, 1e-9) / np.maximum(durations, 1e-9)
+        return speeds
+
+    @property
     def joined(self) -> Flags:
         """Which legs follow another without a stop, (m - 1,)."""
         joined: Flags = self.waits[:-1] == 0
@@ -74,30 +81,6 @@ class Route:
         """
         values = {name: getattr(self, name) for name in ("positions", "speeds", "waits", "lead")}
         return replace(self, **{name: np.round(x, DIGITS) for name, x in values.items()})
-
-    def holds_and_delays(self, *, whole_seconds: bool) -> tuple[Real, Real]:
-        """Return `waits` as holds, which waypoints command, and delays of items after them.
-
-        Both (m,), s. An autopilot that keeps only `whole_seconds` of a hold needs a delay for the
-        fraction; for others the delays are 0.
-        """
-        holds = np.floor(self.waits) if whole_seconds else self.waits
-        return holds, np.round(self.waits - holds, 9)
-
-    def path(self, *, altitude: float = 0.0, wind: Vector = (0.0, 0.0)) -> FlightPath:
-        """Return the legs as a flight model takes them, in a `wind`, m/s.
-
-        All are at `altitude`, m above sea level.
-        """
-        return FlightPath(
-            points=np.column_stack([self.positions, np.zeros(len(self.positions))]),
-            speeds=self.speeds,
-            holds=self.waits,
-            splines=np.zeros(len(self.positions), dtype=bool),
-            radii=self.radii,
-            elevation=altitude,
-            wind=wind,
-        )
 
     def insert(self, at: Integers, positions: Real, times: Real, speeds: Real) -> "Route":
         """Return the route with plain waypoints before those that now have the indices `at` (k,).

@@ -1,5 +1,16 @@
 """What finds speeds, waits and waypoints with which the predicted flight keeps the plan.
 
+For a multicopter it takes as few legs as keep the plan's time and path. The initial route's speeds
+and waits are fitted (`timing`); legs on which the predicted flight is still too far from the plan
+at equal times are split there, and all is fitted anew. In the end legs whose speeds hardly differ
+share one, and values are rounded to what is sent.
+
+An aeroplane aims at a point far ahead on its track: it cuts into bends and swings out of them. So
+its waypoints are moved against its predicted offsets from the plan, again and again; then the
+speeds are fitted. Waypoints are judged by the path alone: the speeds mend the time. The aircraft
+cannot wait, and it is slow to change its speed: a change begins legs before the plan's, and time
+that is lost it cannot always make up for.
+
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
@@ -9,23 +20,37 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.arrays import Integers, Real
-from faao_mav.autopilot import Model, Vehicle
+from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.autopilot import FlightPath, Model, Vehicle
+from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.errors import InputError
 from faao_mav.plan import Vector
-from faao_mav.schedule.route import Route, sent_speeds, with_run_in
-from faao_mav.schedule.schedule import Schedule, positions_at
+from faao_mav.schedule.route import Route, sent_speeds
+from faao_mav.schedule.schedule import PASSING_WINDOW, Schedule, positions_at
 from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Retimed, Unknowns, stepped
+from faao_mav.schedule.waypoints import SHORTEST_HOVER
+from faao_mav.vector import lengths
 
 # The position error at equal times, m, that is left as it is. Repeats of one flight in ArduCopter's
 # simulator differ by up to 0.4 m rms.
 ALLOWED_ERROR = 0.8
 
-WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
-
+_WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 _LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
-
 _ALIKE = 0.1  # the relative difference of neighbours' speeds that are tried as one
+
+# The shortest wait of a copter at the first waypoint, s. After a hold of 1 s ArduCopter is still
+# drifting and leaves 0.4 to 0.75 s late, measured in its simulator.
+_FIRST_WAIT = 6.0
+_SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must be long enough
+
+# The share of its offset from the plan by which a plane's waypoint is moved the other way: with
+# more, neighbouring waypoints correct the same offset and overdo it.
+_MOVE_SHARE = 0.5
+_MOVES = 12  # times that the waypoints are moved; twice as many bring a tenth at most
+_ROUNDS = 3  # times that waypoints are moved and speeds fitted, in turn; chosen
+# Where the plan's speed changes by more than this share, its legs are split so often, s; chosen.
+_CHANGE, _CHANGE_SPACING = 0.05, 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,12 +75,9 @@ class Scheduler(ABC):
     altitude: float = 0.0
     wind: Vector = (0.0, 0.0)
 
+    @abstractmethod
     def first(self, route: Route) -> Schedule:
         """Return `route`, with the run-in that the plan needs, in its first fit to the plan."""
-        return self._first(with_run_in(route, self.t, self.w, self.model, self.max_speed))
-
-    @abstractmethod
-    def _first(self, route: Route) -> Schedule: ...
 
     @abstractmethod
     def refined(self, first: Schedule) -> Schedule:
@@ -64,7 +86,16 @@ class Scheduler(ABC):
     def flight(self, route: Route) -> Schedule:
         """Return the predicted flight of `route`, which is rounded for it."""
         route = self._with_radii(route.rounded())
-        path = route.path(altitude=self.altitude, wind=self.wind)
+        count = len(route.positions)
+        path = FlightPath(
+            points=np.column_stack([route.positions, np.zeros(count)]),
+            speeds=route.speeds,
+            holds=route.waits,
+            splines=np.zeros(count, dtype=bool),
+            radii=route.radii,
+            elevation=self.altitude,
+            wind=self.wind,
+        )
         return Schedule(route, self.model.fly(path), self.t, self.w, self.tolerance)
 
     def fitted(self, route: Route, top_speed: float, *, groups: Integers | None = None) -> Schedule:
@@ -107,7 +138,7 @@ class Scheduler(ABC):
         if len(groups) == 0 or groups[-1] == len(groups) - 1:
             return schedule
         shared = self.fitted(schedule.route, top_speed, groups=groups)
-        most = max(schedule.cost / WORTHWHILE, ALLOWED_ERROR / 2)
+        most = max(schedule.cost / _WORTHWHILE, ALLOWED_ERROR / 2)
         return shared if shared.cost <= most else schedule
 
     def rounded(self, schedule: Schedule, top_speed: float) -> Schedule:
@@ -140,3 +171,146 @@ def _speed_groups(speeds: Real) -> Integers:
         groups[k] = groups[k - 1] + (not same)
         leader = leader if same else k
     return groups
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CopterScheduler(Scheduler):
+    """As `Scheduler`, for an aircraft that waits at hovers and is quick to change its speed.
+
+    Where it would not keep up, speeds are up to a tenth above `max_speed`.
+    """
+
+    def first(self, route: Route) -> Schedule:
+        """Return `route` with the speeds and waits that fit best."""
+        waits = route.waits.copy()
+        waits[0] = max(waits[0], _FIRST_WAIT)
+        if route.last == len(waits) - 1:  # it ends at rest, and takes that long to come to it
+            waits[-1] = max(waits[-1], SHORTEST_HOVER)
+        return self.fitted(replace(route, waits=waits), self.max_speed)
+
+    def refined(self, first: Schedule) -> Schedule:
+        """Return `first` with more legs where it is off, and values as they are sent."""
+        best, top_speed = first, self.max_speed
+        if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
+            top_speed *= OVERSPEED
+            best = self.fitted(best.route, top_speed)
+        while len(times := self._split_times(best)):
+            tried = self.fitted(self._split(best.route, times), top_speed)
+            if tried.cost > _WORTHWHILE * best.cost:
+                break
+            best = tried
+        return self.rounded(self.shared(best, top_speed), top_speed)
+
+    def _split(self, route: Route, times: Real) -> Route:
+        """Return the route with waypoints more where the plan is at the `times` (k,), s.
+
+        The speeds of the parts of a leg differ as the plan's do: the fit begins with them.
+        """
+        at, split = np.searchsorted(route.arrivals, times), self.with_waypoints(route, times)
+        planned = route.planned_speeds
+        shares = split.planned_speeds / np.insert(planned, at, planned[at - 1])
+        return replace(split, speeds=shares * split.speeds)
+
+    def _split_times(self, schedule: Schedule) -> Real:
+        """Return the plan's times (k,), s, at which legs that are too far off are best split."""
+        route = schedule.route
+        off = lengths(schedule.positions(self.t) - self.w)
+        times = []
+        for k in range(route.first, route.last):
+            inside = np.flatnonzero(
+                (self.t > route.departures[k]) & (self.t < route.arrivals[k + 1])
+            )
+            usable = inside[self._long_enough(route, k, inside)]
+            if len(usable) and off[inside].max() > ALLOWED_ERROR:
+                times.append(float(self.t[usable[np.argmax(off[usable])]]))
+        return np.array(times)
+
+    def _long_enough(self, route: Route, k: int, inside: Integers) -> Flags:
+        """Tell for each sample `inside` leg k whether both parts are long enough for their speed.
+
+        On a part much shorter than its ramps the aircraft is slower than planned at the split.
+        """
+        planned_speed = lengths(self.w[inside + 1] - self.w[inside - 1])
+        planned_speed /= self.t[inside + 1] - self.t[inside - 1]
+        legs, result = self.model, np.ones(len(inside), dtype=bool)
+        parts = (
+            (route.positions[k], self.t[inside] - route.departures[k]),
+            (route.positions[k + 1], route.arrivals[k + 1] - self.t[inside]),
+        )
+        for end, duration in parts:
+            length = lengths(self.w[inside] - end)
+            speed = np.maximum(length / duration, _SPEED_SHARE * planned_speed)
+            result &= length >= np.maximum(legs.shortest_leg(speed), legs.least)
+        return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlaneScheduler(Scheduler):
+    """As `Scheduler`, for an aircraft that neither waits nor turns on the spot."""
+
+    def first(self, route: Route) -> Schedule:
+        """Return `route`, of ground speeds, with the waypoints that keep the path best.
+
+        Its speeds are the airspeeds to command for the plan's.
+        """
+        ratio = self.model.true_over_commanded(self.altitude)
+        route = self.with_waypoints(route, self._changes(route))
+        ways = np.diff(route.positions, axis=0)
+        ground = ways * (route.speeds / lengths(ways))[:, None]
+        speeds = np.clip(lengths(ground - self.wind) / ratio, self.min_speed, self.max_speed)
+        return self._kept(replace(route, speeds=speeds))
+
+    def _kept(self, route: Route) -> Schedule:
+        """Return the flight of `route` with its waypoints moved to keep the path best."""
+        schedule = best = self.flight(route)
+        for _ in range(_MOVES):
+            schedule = self.flight(self._moved(schedule))
+            if schedule.deviation.path < best.deviation.path:
+                best = schedule
+        return best
+
+    def _moved(self, schedule: Schedule) -> Route:
+        """Return the route with its waypoints moved against the flight's offsets, by `_MOVE_SHARE`.
+
+        An offset is that from the plan's position when it passes the waypoint to the nearest
+        position of the flight within 3 s of when the waypoint counts as reached, for the flight may
+        pass it again.
+        """
+        route, flown = schedule.route, schedule.flown
+        positions = route.positions.copy()
+        planned = positions_at(route.arrivals, self.t, self.w)
+        for k in range(route.first + 1, route.last + 1):
+            about = flown.arrivals[k]
+            window = [about - PASSING_WINDOW, about + PASSING_WINDOW]
+            first, last = np.searchsorted(flown.t, window)
+            near = flown.position[first:last, :2]
+            positions[k] -= _MOVE_SHARE * (near[np.argmin(lengths(near - planned[k]))] - planned[k])
+        return replace(route, positions=positions)
+
+    def _changes(self, route: Route) -> Real:
+        """Return times, s, at which legs are split so that changes of speed can begin there.
+
+        The vehicle takes as long for the plan's whole range of speeds as `speed_rates` says. So
+        near are the times to where the plan's speed changes: half before it, half behind.
+        """
+        middle = (self.t[1:] + self.t[:-1]) / 2
+        speed = lengths(np.diff(self.w, axis=0)) / np.diff(self.t)
+        reach = np.ptp(speed) / self.model.speed_rates.fall / 2 + _CHANGE_SPACING
+        times: list[float] = []
+        for time in np.arange(self.t[0], self.t[-1], _CHANGE_SPACING).tolist():
+            near = speed[np.abs(middle - time) <= reach]
+            apart = np.abs(np.append(route.arrivals, times[-1:]) - time).min()
+            if len(near) and np.ptp(near) > _CHANGE * near.max() and apart > _CHANGE_SPACING / 3:
+                times.append(time)
+        return np.array(times)
+
+    def refined(self, first: Schedule) -> Schedule:
+        """Return `first` with the speeds that fit best, few and as they are sent."""
+        tried = [first]
+        for _ in range(_ROUNDS):
+            kept = self._kept(tried[-1].route).route
+            if len(tried) > 1 and np.array_equal(kept.positions, tried[-1].route.positions):
+                break  # the waypoints are where they were, and so would be the speeds
+            tried.append(self.fitted(kept, self.max_speed))
+        best = min(tried, key=lambda each: each.cost)
+        return self.rounded(self.shared(best, self.max_speed), self.max_speed)

@@ -12,9 +12,9 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import FlightPath, Flown, Vehicle
 from faao_mav.autopilot.ardupilot.copter import ArduCopter
 from faao_mav.errors import InputError
-from faao_mav.schedule.copter_scheduler import CopterScheduler
 from faao_mav.schedule.route import Route
 from faao_mav.schedule.schedule import Schedule
+from faao_mav.schedule.scheduler import CopterScheduler
 from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD
 
 VEHICLE = Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 400.0, "WPNAV_JERK": 10.0})
