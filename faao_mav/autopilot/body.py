@@ -58,11 +58,6 @@ PX4_BODY = CopterBody(lag=0.26, linear_drag=0.2, quadratic_drag=0.0)
 which a fit finds 0.19."""
 
 
-_LAPSE = 2.25577e-5  # temperature lapse over the temperature at sea level, 1/m
-_EXPONENT = 4.25588  # of the temperature's ratio in that of the density
-_TROPOPAUSE = 11_000.0  # m
-
-
 def density_ratio(altitude: float) -> float:
     """Return the air's density over sea level's, (1 - 2.25577e-5 h)^4.25588 (ISO 2533).
 
@@ -72,7 +67,7 @@ def density_ratio(altitude: float) -> float:
     >>> round(density_ratio(684.0) ** -0.5, 4)
     1.0336
     """
-    return math.pow(1 - _LAPSE * min(altitude, _TROPOPAUSE), _EXPONENT)
+    return math.pow(1 - 2.25577e-5 * min(altitude, 11_000.0), 4.25588)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

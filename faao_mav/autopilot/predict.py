@@ -174,17 +174,12 @@ class _Walk:
         if self._type.hovers and command in _HOLDING and 0 < wait < math.inf:
             whole = self._type.whole_second_holds and command != Command.NAV_DELAY
             hold = math.floor(wait) if whole else wait
+        if np.abs(goal - here).max() <= _SAME_PLACE:
+            goal = here
         own = command == Command.NAV_WAYPOINT and 0 < radius < math.inf
-        self._stretch.append(
-            _Stop(
-                here if np.abs(goal - here).max() <= _SAME_PLACE else goal,
-                index,
-                self._speed,
-                hold,
-                command == Command.NAV_SPLINE_WAYPOINT,
-                radius if own else 0.0,
-            )
-        )
+        spline = command == Command.NAV_SPLINE_WAYPOINT
+        stop = _Stop(goal, index, self._speed, hold, spline, radius if own else 0.0)
+        self._stretch.append(stop)
 
     @property
     def _last(self) -> Real:

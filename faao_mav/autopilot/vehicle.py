@@ -179,16 +179,18 @@ class Vehicle:
         circles there.
         """
         rule, level = self.type.rally(self), self.returns_at(float(here[2]))
-        places = [frame.to_local(point.latitude, point.longitude) for point in mission.rally]
-        away = [float(np.hypot(*(place - here[:2]))) for place in places]
-        nearest = min(range(len(away)), key=away.__getitem__, default=None)
-        to_home = float(np.hypot(*(home[:2] - here[:2]))) if rule.home else math.inf
-        if nearest is None or away[nearest] > rule.limit or away[nearest] >= to_home:
-            return np.array([*home[:2], level])
-        height = mission.rally[nearest].altitude
+        rally = [(frame.to_local(at.latitude, at.longitude), at.altitude) for at in mission.rally]
+
+        def away(choice: tuple[Real, float]) -> float:
+            return float(np.hypot(*(choice[0] - here[:2])))
+
+        choices = [each for each in rally if away(each) <= rule.limit]
+        if rule.home or not choices:
+            choices.insert(0, (home[:2], math.nan))
+        place, height = min(choices, key=away)
         if not math.isnan(height):
             level = max(level, height) if self.type.hovers else height
-        return np.array([*places[nearest], level])
+        return np.array([*place, level])
 
     def flight_model(self, latitude: float | None = None) -> Model:
         """Return how it flies at `latitude`, degrees.

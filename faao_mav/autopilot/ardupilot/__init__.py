@@ -88,13 +88,6 @@ ARDUPILOT = AutopilotFamily(
 """Manners: `MissionItemProtocol.cpp` (behaviour only), and what it did in its simulator."""
 
 _UNION = 2  # The bit of FENCE_OPTIONS by which being inside one of several inclusions is enough.
-
-
-def _needs_one_inclusion(vehicle: ParameterValues) -> bool:
-    """Tell whether being inside one of several inclusion areas is enough for `vehicle`."""
-    return bool(int(vehicle.value("fence_options")) & _UNION)
-
-
 _AREAS = 4  # The bit of FENCE_TYPE by which the areas of a fence count.
 
 
@@ -142,7 +135,7 @@ ardupilot_type = partial(
     VehicleType,
     family=ARDUPILOT,
     spool=3.5,  # measured: 100 m of take-off take 46 s
-    fence_needs_one_inclusion=_needs_one_inclusion,
+    fence_needs_one_inclusion=lambda vehicle: int(vehicle.value("fence_options")) & _UNION != 0,
     home_outside_fence="with FENCE_ENABLE 1 ArduPilot does not arm there",  # measured on 4.7
     models_wind=True,
     rally=_rally_rule,
