@@ -108,11 +108,6 @@ def convert(solution: Solution) -> Conversion:
     A route whose legs or predicted flight leave the plan's fence is made anew with half the path
     tolerance, again and again down to 0.25 m; if none keeps inside, it is the one that leaves the
     fence the least. The rest is as in `_convert`.
-
-    >>> from faao_mav import optimize, read_plan
-    >>> conversion = convert(optimize(read_plan("missions/copter_relay.yaml")))
-    >>> sorted(conversion.parameters)[:2]
-    ['WPNAV_ACCEL', 'WPNAV_JERK']
     """
     plan, area = solution.plan, solution.plan.keep_in
     best = _convert(solution, plan)
@@ -190,16 +185,12 @@ def _scheduler(plan: Plan, t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
         min_speed=least,
         max_speed=min(fastest, most),
         tolerance=plan.mission.path_tolerance,
-        altitude=_altitude(plan),
+        altitude=plan.origin.elevation + plan.flight.altitude,
         wind=plan.wind,
     )
 
 
-def _altitude(plan: Plan) -> float:
-    """Return the height of the flight above sea level, m."""
-    return plan.origin.elevation + plan.flight.altitude
-
-
 def _true_over_commanded(plan: Plan) -> float:
     """Return true over commanded airspeed at the height of the flight."""
-    return plan.aircraft.flight_model().true_over_commanded(_altitude(plan))
+    altitude = plan.origin.elevation + plan.flight.altitude
+    return plan.aircraft.flight_model().true_over_commanded(altitude)
