@@ -59,8 +59,8 @@ CIRCLING = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
 """How a vehicle goes on that circles where its mission or its return ends."""
 
 
-def plane_orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
-    """Return how a plane circles at `item`.
+def orbit_at(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+    """Return how `item` is circled at, None where it is not.
 
     The radius is the item's, param3 or of a LOITER_TO_ALT param2, and without one the vehicle's
     `loiter_radius`; negative ones turn left.

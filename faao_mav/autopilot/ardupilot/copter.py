@@ -15,7 +15,7 @@ from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import Modes
 from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
-from faao_mav.autopilot.orbit import Orbit
+from faao_mav.autopilot.orbit import Orbit, orbit_at
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, Recommended, row, rule, table
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
@@ -203,7 +203,7 @@ _TABLE = table(
     *SHARED,
     rule("fence_options", 0, "FENCE_OPTIONS"),
     rule("fence_type", 7, "FENCE_TYPE"),
-    row("circle_radius", "m", 10.0, "CIRCLE_RADIUS_M", "CIRCLE_RADIUS", least=0.0),
+    row("loiter_radius", "m", 10.0, "CIRCLE_RADIUS_M", "CIRCLE_RADIUS", least=0.0),
     row("circle_rate", "rad/s", 20, "CIRCLE_RATE", least=-math.inf),
     Parameter("rally_limit", "m", 300.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
     rule("rally_home", 1, "RALLY_INCL_HOME"),
@@ -219,19 +219,13 @@ def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
     """
     if item.command != Command.NAV_LOITER_TURNS:
         return None
-    given, rate = item.params[2], vehicle.value("circle_rate")
-    told = math.isfinite(given) and given != 0
-    radius = abs(given) if told else vehicle.value("circle_radius")
-    turns = item.params[0] if math.isfinite(item.params[0]) else 0.0
-    if radius <= 0 or rate == 0:
+    rate, orbit = vehicle.value("circle_rate"), orbit_at(vehicle, item)
+    if orbit is None or orbit.radius == 0 or rate == 0:
         return None
-    most = math.sqrt(vehicle.value("acceleration") / (2 * radius))
-    return Orbit(
-        radius,
-        given > 0 if told else rate > 0,
-        turns=max(turns, 0.0),
-        turn_rate=min(abs(rate), most),
-    )
+    told = math.isfinite(item.params[2]) and item.params[2] != 0
+    most = math.sqrt(vehicle.value("acceleration") / (2 * orbit.radius))
+    clockwise = orbit.clockwise if told else rate > 0
+    return replace(orbit, clockwise=clockwise, turn_rate=min(abs(rate), most))
 
 
 ARDUCOPTER = ardupilot_type(

@@ -25,7 +25,7 @@ from faao_mav.autopilot.model import (
     parameter,
     unit,
 )
-from faao_mav.autopilot.orbit import plane_orbit
+from faao_mav.autopilot.orbit import orbit_at
 from faao_mav.autopilot.parameter import Parameter, row, rule, table
 from faao_mav.power import GRAVITY
 
@@ -271,7 +271,7 @@ ARDUPLANE = ardupilot_type(
     flight_model=ArduPlane.from_vehicle,
     ceilings={"max_acceleration": ("roll_limit",)},
     body=ARDUPLANE_BODY,
-    orbits=plane_orbit,
+    orbits=orbit_at,
 )
 """ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
 recommended."""

@@ -17,7 +17,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
 from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
-from faao_mav.autopilot.orbit import RallyRule, plane_orbit
+from faao_mav.autopilot.orbit import RallyRule, orbit_at
 from faao_mav.autopilot.parameter import ParameterValues, Recommended, row, rule, table
 from faao_mav.autopilot.px4.dialect import DIALECT
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
@@ -214,6 +214,6 @@ PX4_PLANE = _px4_type(
     modes=replace(_MODES, guided=None),
     hovers=False,
     parameters=_PLANE_TABLE,
-    orbits=plane_orbit,
+    orbits=orbit_at,
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""
