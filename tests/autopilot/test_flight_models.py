@@ -124,19 +124,6 @@ def test_climbs_at_its_own_speed_on_the_straight_line(model: Model, up: float, d
 # ---- ArduCopter
 
 
-def test_measured_mean_speeds_by_spacing() -> None:
-    for model, speeds in (
-        (ArduCopter(), {2: 0.9, 5: 1.7, 10: 2.7, 20: 4.4, 40: 7.0}),
-        (ArduCopter(acceleration=5, jerk=5), {2: 1.4, 5: 2.7, 10: 4.5, 20: 7.2, 40: 8.0}),
-    ):
-        for spacing, speed in speeds.items():
-            legs = max(12, 240 // spacing)
-            arrivals = model.fly(line(spacing, legs)).arrivals
-            first, last = legs // 3, 2 * legs // 3
-            mean = spacing * (last - first) / (arrivals[last] - arrivals[first])
-            assert mean == pytest.approx(speed, abs=0.1), spacing
-
-
 def test_the_lean_angle_and_the_body_bound_its_speed() -> None:
     for vehicle, top in (
         (Vehicle(parameters={"ANGLE_MAX": 3000}), 10.3),  # measured
