@@ -7,8 +7,7 @@ from typing import Any, Literal, TypeAlias
 from faao_mav.autopilot import AutopilotFamily
 from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.dialect import BESIDE
-from faao_mav.autopilot.px4 import PX4, px4_mode
-from faao_mav.autopilot.px4.dialect import CONDITIONS, FLIES, LEAST_TAKEOFF
+from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF, PX4, px4_mode
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, POLYGON, RALLY_POINT, Command, Frame
 from faao_mav.mission.item import Mission
 from faao_mav.wire.messages import WireItem

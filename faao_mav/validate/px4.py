@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from faao_mav.autopilot.dialect import name_of
-from faao_mav.autopilot.px4.dialect import CONDITIONS, FLIES, LEAST_TAKEOFF
+from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero
 from faao_mav.validate.rule import Hits, checks, hit

@@ -7,8 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
-from faao_mav.autopilot.ardupilot.dialect import COPTER_DIALECT
+from faao_mav.autopilot.ardupilot import COPTER_DIALECT, SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY

@@ -9,8 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.ardupilot import SHARED, ardupilot_type, at_fence
-from faao_mav.autopilot.ardupilot.dialect import PLANE_DIALECT
+from faao_mav.autopilot.ardupilot import PLANE_DIALECT, SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
 from faao_mav.autopilot.failsafe import failsafes
 from faao_mav.autopilot.manners import Modes
