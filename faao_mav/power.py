@@ -17,7 +17,7 @@ optimised, `partials` are the derivatives of the power of level flight.
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -63,19 +63,6 @@ class PowerPartials:
     by_vv: Real
     by_aa: Real
     by_va: Real
-
-
-class PowerModel(Protocol):
-    """What a flight takes, W."""
-
-    def __call__(self, velocity: Real, acceleration: Real) -> Real:
-        """Return W (...) at velocities through the air and accelerations (..., 3), m/s, m/s^2."""
-
-    def partials(self, v: Real, a: Real) -> PowerPartials:
-        """Return what flight at v and a (2, ...), m/s, m/s^2, takes at most, with derivatives."""
-
-    def least_power(self, speeds: Real) -> tuple[float, float]:
-        """Return the one of the `speeds` of least power in straight and level flight, and that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,12 +124,12 @@ class RotaryWing:
         return np.asarray(profile + self.induced * inflow + self.parasite * speed**3)
 
     def __call__(self, velocity: Real, acceleration: Real) -> Real:  # noqa: ARG002
-        """Return W (...): see `PowerModel`; accelerations cost nothing."""
+        """Return W (...) at velocities through the air (..., 3), m/s; accelerations are free."""
         speed = np.linalg.norm(velocity[..., :2], axis=-1)
         return np.asarray(self.level(speed) + self.weight * np.maximum(0.0, velocity[..., 2]))
 
     def partials(self, v: Real, a: Real) -> PowerPartials:  # noqa: ARG002
-        """Return P and its derivatives: see `PowerModel`; those by a are 0."""
+        """Return what flight at v (2, ...), m/s, takes, with derivatives: those by a are 0."""
         speed = np.hypot(*v)
         # P as a function of q = v^2, and the inflow as one of r = q / (2 v_0^2)
         per_square = 1 / (2 * self.induced_speed**2)
@@ -159,7 +146,7 @@ class RotaryWing:
         return PowerPartials(self.level(speed), 2 * first * v, 0 * v, by_vv, 0 * by_vv, none)
 
     def least_power(self, speeds: Real) -> tuple[float, float]:
-        """Return the speed of least power: see `PowerModel`."""
+        """Return the one of the `speeds` of least power in level flight, m/s, and that, W."""
         return _least(speeds, self.level(speeds))
 
 
@@ -186,7 +173,7 @@ class FixedWing:
         return np.asarray(self.c1 * speed**3 + lift * (1 + (across / GRAVITY) ** 2))
 
     def __call__(self, velocity: Real, acceleration: Real) -> Real:
-        """Return W (...): see `PowerModel`."""
+        """Return W (...) at velocities through the air and accelerations (..., 3), m/s, m/s^2."""
         v, a = velocity[..., :2], acceleration[..., :2]
         speed = np.linalg.norm(v, axis=-1)
         across = np.abs(v[..., 0] * a[..., 1] - v[..., 1] * a[..., 0])
@@ -195,7 +182,7 @@ class FixedWing:
         return np.asarray(self.level(speed, turning) + self.mass * np.maximum(0.0, gained))
 
     def partials(self, v: Real, a: Real) -> PowerPartials:
-        """Return P and its derivatives: see `PowerModel`."""
+        """Return what flight at v and a (2, ...), m/s, m/s^2, takes at most, with derivatives."""
         speed = np.maximum(np.hypot(*v), _LEAST_AIRSPEED)
         across = v[0] * a[1] - v[1] * a[0]
         by_turn, turned = (
@@ -225,8 +212,12 @@ class FixedWing:
         return PowerPartials(value, by_v, by_a, by_vv, by_aa, by_va)
 
     def least_power(self, speeds: Real) -> tuple[float, float]:
-        """Return the speed of least power: see `PowerModel`."""
+        """Return the one of the `speeds` of least power in straight and level flight, and that."""
         return _least(speeds, self.level(speeds, np.zeros_like(speeds)))
+
+
+PowerModel: TypeAlias = RotaryWing | FixedWing
+"""What a flight takes, W."""
 
 
 def _packed(x: Real, y: Real) -> Real:

@@ -252,8 +252,8 @@ def _flights(
         known = np.isfinite(record.rssi)
         level, unit = level_of(path, record.rssi[known], units.get("rssi", "raw"), calibration)
         t, up = record.t[known], (record.altitude - record.home)[known]
-        where = record.latitude[known], record.longitude[known]
-        yield samples_at(path, station, t, *where, up, level), unit
+        at = t, record.latitude[known], record.longitude[known], up
+        yield samples_at(path, station, at, level), unit
 
 
 def _by_rates(path: Path, samples: "Samples", rates: Path | None) -> "Samples":

@@ -18,7 +18,6 @@ from faao_mav.plan.station import Station
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.channel import (
     balanced_rayleigh,
-    line_of_sight_all_ones,
     line_of_sight_ula,
     rayleigh,
     rician,
@@ -27,8 +26,7 @@ from faao_mav.radio.constellation import (
     DifferenceClasses,
     difference_classes,
 )
-from faao_mav.radio.gain import GainFunction
-from faao_mav.radio.gain_field import GainField
+from faao_mav.radio.gain import GainField, GainFunction
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.rate_steps import StreamRate, one_stream
@@ -113,7 +111,7 @@ class Link:
     def line_of_sight_at(self, cosine: Real) -> Complex:
         """Return H^LoS (..., N_r, N_t) at direction cosines u = (x - x_j) / d (...)."""
         if not self.follows_position:
-            ones = line_of_sight_all_ones(self.receive, self.transmit)
+            ones = np.ones((self.receive, self.transmit), dtype=np.complex128)
             return np.broadcast_to(ones, (*cosine.shape, *ones.shape))
         across = np.sqrt(np.maximum(0.0, 1 - cosine**2))
         outward = np.stack([cosine, across, np.zeros_like(cosine)], axis=-1)

@@ -1,15 +1,13 @@
 """What a plan names by a file that lies beside it, put in its place."""
 
 from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from faao_mav.errors import InputError, PlanError
-from faao_mav.files import read_text
+from faao_mav.files import read_columns, read_text
 from faao_mav.plan.station import read_track
 from faao_mav.plan.yaml_text import load_yaml
-from faao_mav.radio.columns import read_columns
 from faao_mav.radio.map_file import WORD, map_word, read_map
 
 MAX_CHARACTERS = 1_000_000
@@ -46,42 +44,32 @@ def filled_in(data: dict[str, Any], source: str) -> Iterator[tuple[tuple[str, ..
     `PlanError` for a file that cannot be read.
     """
     for keys, read in _FILES:
-        section: Any = data
-        for step in keys[:-1]:
-            section = section.get(step) if isinstance(section, dict) else None
-        if not isinstance(section, dict):
-            continue
         place, folder = f"{source}: {'.'.join(keys)}", Path(source).parent
         try:
-            name = section.get(keys[-1])
-            if isinstance(name, str) and "\n" not in name:  # which is a file's content
-                path = folder / name
-                text = read_text(path, MAX_CHARACTERS, "text", PlanError)
-                section[keys[-1]] = read(text, str(path))
+            section, key = _holder(data, keys), keys[-1]
+            if path := _file(section.get(key), folder):
+                section[key] = read(read_text(path, MAX_CHARACTERS, "text", PlanError), str(path))
                 yield keys, str(path)
-                place, folder = f"{place}: {path}", path.parent
-            law = section.get(keys[-1])
-            name = law.get("map") if isinstance(law, dict) else None
-            if isinstance(law, dict) and isinstance(name, str) and not name.startswith(WORD):
-                path = folder / name
-                place = f"{place}.map" if folder == Path(source).parent else f"{place}: map"
-                law["map"] = _word(path, *_version(path))
+                place, folder = f"{place}: {path}: map", path.parent
+            else:
+                place = f"{place}.map"
+            law = _holder(data, (*keys, "map"))
+            if path := _file(law.get("map"), folder):
+                law["map"] = map_word(read_map(path))
                 yield (*keys, "map"), str(path)
         except InputError as error:
             raise PlanError(f"{place}: {error}") from None
 
 
-def _version(path: Path) -> tuple[int, int]:
-    """Return what tells a file from what it was before; zeros where it cannot be read."""
-    try:
-        told = path.stat()
-    except (OSError, ValueError):
-        return 0, 0
-    return told.st_mtime_ns, told.st_size
+def _holder(data: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return the mapping in `data` that has the last of `keys`; an empty one for none."""
+    for step in keys[:-1]:
+        inside = data.get(step)
+        data = inside if isinstance(inside, dict) else {}
+    return data
 
 
-@lru_cache(maxsize=8)
-def _word(path: Path, changed: int, size: int) -> str:
-    """Return the word of the map in a file: the page reads its plan anew at every change of it."""
-    del changed, size
-    return map_word(read_map(path))
+def _file(name: object, folder: Path) -> Path | None:
+    """Return the file of that `name`; None for a value that is the content of one."""
+    is_name = isinstance(name, str) and "\n" not in name and not name.startswith(WORD)
+    return folder / str(name) if is_name else None

@@ -14,11 +14,7 @@ from faao_mav.autopilot.body import Body
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
-from faao_mav.plan.fields import (
-    Text,
-    key,
-    section,
-)
+from faao_mav.plan.fields import Text, key, section
 from faao_mav.plan.ground import ground_areas
 from faao_mav.plan.radio import Radio
 from faao_mav.plan.sections import (

@@ -11,8 +11,8 @@ from pydantic_core import PydanticCustomError
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, MissionFileError, PlanError, quote
+from faao_mav.files import read_columns
 from faao_mav.plan.fields import PLACE, Written, key, read_pair, read_position, section, told
-from faao_mav.radio.columns import read_columns
 from faao_mav.vector import Vector
 
 MAX_POINTS = 5_000

@@ -4,14 +4,7 @@ from typing import Annotated, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from faao_mav.plan.fields import (
-    MAX_LOCAL_DISTANCE,
-    Number,
-    Position,
-    Text,
-    key,
-    section,
-)
+from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Number, Position, Text, key, section
 from faao_mav.vector import Vector
 
 

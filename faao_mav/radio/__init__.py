@@ -1,10 +1,9 @@
 """The radio link of the relay, from bits to rates: (1) to (8) of the paper.
 
 - ``constellation``: the alphabets, and the differences between their vectors merged into classes;
-- ``gain``: the law of the path gain;
+- ``gain``: the law of the path gain, and its field over the map;
 - ``channel``: line of sight and fading, (1) and (2);
-- ``rate``: the rate that counts by its name, and the cutoff rate, (7) and (8), from the sums of
-  ``class_sum``, which ``square_sum`` forms for square alphabets;
+- ``rate``: the rate that counts by its name, and the cutoff rate, (7) and (8);
 - ``mutual_information``: the mutual information, (5) and (6), at fixed noises;
 - ``precoder``: the classical linear precoders and the optimum for BPSK on two antennas;
 - ``best_precoder``: the precoders of highest rate, one per channel or one for many draws, found by

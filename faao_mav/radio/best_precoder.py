@@ -15,8 +15,7 @@ information in linear vector Gaussian channels", IEEE Trans. Inf. Theory 52 (200
 import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
-from faao_mav.radio.class_sum import ClassSum, class_sum
-from faao_mav.radio.constellation import difference_classes
+from faao_mav.radio.constellation import coordinates, difference_classes, outer
 from faao_mav.radio.mutual_information import NODES, mutual_information
 from faao_mav.radio.precoder import bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.precoder_search import (
@@ -28,8 +27,7 @@ from faao_mav.radio.precoder_search import (
     starting_points,
     unit,
 )
-from faao_mav.radio.quadratic_form import coordinates, outer
-from faao_mav.radio.rate import Measure
+from faao_mav.radio.rate import ClassSum, Measure, class_sum
 
 _CHUNK = 4_000_000
 """Numbers in memory at once while channels are searched together: 32 MB. Chosen."""

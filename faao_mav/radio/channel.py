@@ -36,15 +36,6 @@ def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
     return entries
 
 
-def line_of_sight_all_ones(receive: int, transmit: int) -> Complex:
-    """Return the H^LoS of ones, (receive, transmit), as the paper has it: all elements in phase.
-
-    >>> line_of_sight_all_ones(1, 2).real
-    array([[1., 1.]])
-    """
-    return np.ones((receive, transmit), dtype=np.complex128)
-
-
 def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) -> Complex:
     """Return draws from `rng` of H^NLoS, (slots, receive, transmit), independent CN(0, 1) each.
 

@@ -4,10 +4,8 @@ Each alphabet is kept unscaled on an integer grid (on the unit circle for 8-PSK)
 differences and products of symbols are exact, and is scaled to unit energy only when handed out.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -24,17 +22,12 @@ def _square_qam(side: int) -> Complex:
     return (levels[:, None] + 1j * levels).ravel()
 
 
-def _8psk() -> Complex:
-    r = np.sqrt(0.5)
-    return np.array([1, r + 1j * r, 1j, -r + 1j * r, -1, -r - 1j * r, -1j, r - 1j * r])
-
-
-_GRIDS: dict[str, Callable[[], Complex]] = {
-    "bpsk": lambda: np.array([1.0 + 0j, -1.0]),
-    "qpsk": lambda: _square_qam(2),
-    "8psk": _8psk,
-    "16qam": lambda: _square_qam(4),
-    "64qam": lambda: _square_qam(8),
+_GRIDS: dict[str, Complex] = {
+    "bpsk": np.array([1.0 + 0j, -1.0]),
+    "qpsk": _square_qam(2),
+    "8psk": np.exp(0.25j * np.pi * np.arange(8)),
+    "16qam": _square_qam(4),
+    "64qam": _square_qam(8),
 }
 
 _BY_PARTS = ("16qam", "64qam")
@@ -50,7 +43,7 @@ def _grid(modulation: str) -> tuple[Complex, float]:
     """Return the unscaled alphabet and the factor that gives it unit mean energy."""
     if modulation not in _GRIDS:
         raise InputError(f"unknown modulation {modulation!r}; known are {', '.join(MODULATIONS)}")
-    grid = _GRIDS[modulation]()
+    grid = _GRIDS[modulation]
     return grid, float(1.0 / np.sqrt(np.mean(np.abs(grid) ** 2)))
 
 
@@ -90,6 +83,34 @@ def symbol_vectors(modulation: str, antennas: int) -> Complex:
     return vectors
 
 
+def features(u: Complex) -> Real:
+    """Return φ (..., N²) of u (..., N): |u_i|², then Re and Im of 2 u_i u_j* for i < j.
+
+    With the ``coordinates`` z of a Hermitian Z, u^H Z u = Σ_a φ_a z_a.
+    """
+    i, j = np.triu_indices(u.shape[-1], 1)
+    product = 2.0 * u[..., i] * u[..., j].conj()
+    return np.concatenate([np.abs(u) ** 2, product.real, product.imag], axis=-1)
+
+
+def coordinates(Z: Complex) -> Real:
+    """Return z (..., N²) of Z (..., N, N): its diagonal, then Re and Im of what is above it."""
+    above = Z[(..., *np.triu_indices(Z.shape[-1], 1))]
+    diagonal = np.diagonal(Z, axis1=-2, axis2=-1).real
+    return np.concatenate([diagonal, above.real, above.imag], axis=-1)
+
+
+def outer(phi: Real) -> Complex:
+    """Return the Hermitian u u^H (..., N, N), or a mean of it, of the features φ (..., N²)."""
+    N = round(phi.shape[-1] ** 0.5)
+    i, j = np.triu_indices(N, 1)
+    re, im = phi[..., N : N + len(i)], phi[..., N + len(i) :]
+    M = np.zeros((*phi.shape[:-1], N, N), dtype=np.complex128)
+    M[..., np.arange(N), np.arange(N)] = phi[..., :N]
+    M[..., i, j], M[..., j, i] = (re + 1j * im) / 2, (re - 1j * im) / 2
+    return M
+
+
 @dataclass(frozen=True, eq=False)
 class DifferenceClasses:
     """The non-zero differences u_mk = x_m - x_k of (7), merged up to a common unit phase.
@@ -101,7 +122,7 @@ class DifferenceClasses:
     pairs (m, k) lie in it. `symbols` is rho**N, the number of input vectors and the size of the
     zero class; `bits` is N log2(rho), what one channel use carries at most. `part_differences`
     (2, L) are the differences of the real or the imaginary parts of two symbols, and how many
-    ordered pairs of levels give each, where sums are formed by them: ``square_sum``.
+    ordered pairs of levels give each, where sums are formed by them: ``SquareSum``.
     """
 
     vectors: Complex
@@ -141,8 +162,8 @@ def difference_vector_count(modulation: str, antennas: int) -> int:
 def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     """Return the differences of all pairs of input vectors, merged into classes.
 
-    Two vectors differ by a unit phase exactly if u u^H is the same, so the entries of u u^H,
-    exact on the integer grids and rounded for 8-PSK, identify a class. Pairs are never enumerated:
+    Two vectors differ by a unit phase exactly if u u^H is the same, so its ``features``, exact on
+    the integer grids and rounded for 8-PSK, identify a class. Pairs are never enumerated:
     the distinct differences of single symbols are counted and combined over the antennas. Raises
     `InputError` for an unknown modulation.
 
@@ -155,9 +176,8 @@ def difference_classes(modulation: str, antennas: int) -> DifferenceClasses:
     u = _product(values, antennas)
     pairs = _product(counts.astype(np.complex128), antennas).real.prod(axis=1)
 
-    outer = [u[:, i] * u[:, j].conj() for i, j in combinations_with_replacement(range(antennas), 2)]
-    keys = np.round(np.column_stack([part for o in outer for part in (o.real, o.imag)]), _DECIMALS)
-    _, first, label = np.unique(keys + 0.0, axis=0, return_index=True, return_inverse=True)
+    keys = np.round(features(u), _DECIMALS) + 0.0
+    _, first, label = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     multiplicity: Real = np.bincount(label.ravel(), weights=pairs).astype(np.float64)
     vectors = u[first] * scale
 

@@ -7,7 +7,7 @@ is the spread that is left.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -188,11 +188,12 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     means = tuple(flight.means(seconds) for flight in flights)
     place = np.concatenate([each.place for each in means])
     level = np.concatenate([each.level for each in means])
+    source = ", ".join(each.source for each in means)
     if len(level) < _LEAST:
         text = f"{len(level)} means over {seconds:g} s in flight; expected at least {_LEAST}"
-        raise InputError(f"{_sources(means)}: {text}")
+        raise InputError(f"{source}: {text}")
     if np.ptp(place, axis=0).max() < 1.0:
-        raise InputError(f"{_sources(means)}: one place alone; expected a flight")
+        raise InputError(f"{source}: one place alone; expected a flight")
     legs = legs_of(means)
     heights = _heights(place[:, 2], legs)
     parts = [part for part in (legs, heights) if part.max() > 0]
@@ -204,46 +205,26 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     best, paper = _PAPER, errors(_PAPER)
     spread = paper
     for law in sorted(product((False, True), range(TERMS + 1)), key=lambda law: sum(law)):
-        if parts and law != _PAPER and not _wild(*_linear(place, level, *law), law):
+        if parts and law != _PAPER and not _wild(*_linear(place, level, *law), law[1]):
             tried = errors(law)
             if np.mean(tried) < (1.0 - _PAYS) * np.mean(spread):
                 best, spread = law, tried
-    return _with_errors(means, best, legs, spread, paper, int(heights.max()) + 1)
-
-
-def _with_errors(
-    means: tuple[Samples, ...],
-    law: tuple[bool, int],
-    legs: Integers,
-    spread: list[float],
-    paper: list[float],
-    heights: int,
-) -> LinkFit:
-    """Return the fit of `law` to `means`, its errors by the jackknife over `legs`."""
-    place = np.concatenate([each.place for each in means])
-    level = np.concatenate([each.level for each in means])
-    A, y = _linear(place, level, *law)
+    free, terms = best
+    A, y = _linear(place, level, free, terms)
     c = _robust(A, y)
     residual = y - A @ c
-    count = int(legs.max()) + 1
-    error, at_places = np.full(len(c), np.inf), np.full(1, np.inf)
-    if count > 1:
-        without = np.array([_robust(A[legs != leg], y[legs != leg]) for leg in range(count)])
-        away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
-        error = np.sqrt(np.sum(away**2, axis=0))
-        at_places = np.sqrt(np.sum((A @ away.T) ** 2, axis=1))
-    free, terms = law
+    error, error_of_gain = _jackknife(A, y, legs)
     return LinkFit(
         level=float(c[0]),
         exponent=float(c[1]) if free else 2.0,
         elevation=tuple(map(float, c[len(c) - terms :])),
         errors=(float(error[0]), float(error[1]) if free else 0.0, *error[len(c) - terms :]),
-        error=_rms(at_places),
+        error=error_of_gain,
         spread=spread[-1] if spread else _rms(residual),
         paper_spread=paper[-1] if paper else _rms(residual),
         correlation=_correlation(means, residual),
-        legs=count,
-        heights=heights,
+        legs=int(legs.max()) + 1,
+        heights=int(heights.max()) + 1,
         flights=means,
     )
 
@@ -279,11 +260,20 @@ def _left_out(A: Real, y: Real, part: Integers) -> Real:
     return error
 
 
-def _wild(A: Real, y: Real, law: tuple[bool, int]) -> bool:
+def _jackknife(A: Real, y: Real, legs: Integers) -> tuple[Real, float]:
+    """Return the standard errors of c (m,) and of A c by leaving out legs; infinite of one leg."""
+    count = int(legs.max()) + 1
+    if count == 1:
+        return np.full(A.shape[1], np.inf), math.inf
+    without = np.array([_robust(A[legs != leg], y[legs != leg]) for leg in range(count)])
+    away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
+    return np.sqrt(np.sum(away**2, axis=0)), _rms(np.linalg.norm(A @ away.T, axis=1))
+
+
+def _wild(A: Real, y: Real, terms: int) -> bool:
     """Whether the fitted terms of the elevation go beyond what antennas do, where none flew."""
-    terms = law[1]
     s = np.linspace(0.0, 1.0, 101)[:, None] ** np.arange(1, terms + 1)
-    return terms > 0 and float(np.ptp(s @ _robust(A, y)[-terms:])) > _SWING
+    return float(np.ptp(s @ _robust(A, y)[A.shape[1] - terms :])) > _SWING
 
 
 def legs_of(means: Sequence[Samples]) -> Integers:
@@ -319,16 +309,16 @@ def _heights(up: Real, legs: Integers) -> Integers:
 
 def _correlation(means: Sequence[Samples], residual: Real) -> float:
     """Return the L, m, for which exp(-distance/L) is nearest to the residuals' correlation."""
-    total, pairs, begin = np.zeros(len(_LAGS) - 1), np.zeros(len(_LAGS) - 1), 0
-    for flight in means:
-        every = -(-len(flight.t) // _MOST_PAIRED)
-        rest = residual[begin : begin + len(flight.t)][::every]
-        begin += len(flight.t)
-        for away, product_ in _pairs(flight.place[::every], rest):
-            lag = np.digitize(away, _LAGS) - 1
-            near = lag < len(pairs)
-            total += np.bincount(lag[near], product_[near], len(pairs))
-            pairs += np.bincount(lag[near], minlength=len(pairs))
+    total, pairs = np.zeros((2, len(_LAGS) - 1))
+    ends = np.cumsum([len(flight.t) for flight in means])
+    for flight, rest in zip(means, np.split(residual, ends[:-1]), strict=True):
+        every = -(-len(rest) // _MOST_PAIRED)
+        place, rest = flight.place[::every], rest[::every]
+        i, j = np.triu_indices(len(rest), 1)
+        lag = np.digitize(np.linalg.norm(place[j] - place[i], axis=-1), _LAGS) - 1
+        near = lag < len(pairs)
+        total += np.bincount(lag[near], (rest[i] * rest[j])[near], len(pairs))
+        pairs += np.bincount(lag[near], minlength=len(pairs))
     power = float(np.mean(residual**2))
     if power == 0.0:
         return 0.0
@@ -342,15 +332,5 @@ def _correlation(means: Sequence[Samples], residual: Real) -> float:
     return math.exp(float(minimize_scalar(apart, bounds=(0.0, 7.0), method="bounded").x))
 
 
-def _pairs(place: Real, residual: Real) -> Iterator[tuple[Real, Real]]:
-    """Yield the distances of each place to all later ones, m, and the products of residuals."""
-    for i in range(len(place) - 1):
-        yield np.linalg.norm(place[i + 1 :] - place[i], axis=-1), residual[i + 1 :] * residual[i]
-
-
 def _rms(x: Real) -> float:
     return float(np.sqrt(np.mean(x**2)))
-
-
-def _sources(means: Sequence[Samples]) -> str:
-    return ", ".join(each.source for each in means)

@@ -10,12 +10,14 @@ antennas' patterns and the ground do over the elevation is in c_1 to c_3.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Integers, Real
+from faao_mav.radio.gain_map import Grid
+from faao_mav.radio.spline import Spline
 
 PER_DB = float(np.log(10.0) / 10.0)
 """The natural logarithm of a gain of 1 dB."""
@@ -114,15 +116,10 @@ class PathGain(GainFunction):
         """Whether this is the paper's rho_0 d^-2."""
         return self.exponent == 2.0 and not any(self.elevation_db)
 
-    def gain(self, squared_distance: Real, height: float) -> Real:
-        """Return the linear gain at d² (...), m², the one antenna `height` m above the other."""
-        beyond = self._beyond_square_law(squared_distance, height)
-        return np.asarray(self.reference_gain / squared_distance * np.exp(beyond))
-
     def log(self, squared_distance: Real, height: float | Real) -> Real:
         """Return l, the natural logarithm of `gain`, (...)."""
-        beyond = self._beyond_square_law(squared_distance, height)
-        return np.asarray(np.log(self.reference_gain / squared_distance) + beyond)
+        by_distance = np.log(self.reference_gain) - self.exponent / 2 * np.log(squared_distance)
+        return np.asarray(by_distance + self._elevation(height / np.sqrt(squared_distance), 0))
 
     def by_log_distance(self, squared_distance: Real, height: float) -> tuple[Real, Real]:
         """Return l_t and l_tt (...) by t = ln d², where d s / d t = -s / 2."""
@@ -158,11 +155,6 @@ class PathGain(GainFunction):
             total = (total + (-k / 2) ** order * self._terms[k - 1]) * s
         return total
 
-    def _beyond_square_law(self, squared_distance: Real, height: float | Real) -> Real:
-        """Return ln of the gain over rho_0 d^-2, (...)."""
-        s = height / np.sqrt(squared_distance)
-        return (1 - self.exponent / 2) * np.log(squared_distance) + self._elevation(s, 0)
-
 
 _REAL = 1e-6
 """The imaginary part, in its size, up to which a root is real: a double root splits by rounding. A
@@ -172,3 +164,87 @@ distance too many does no harm."""
 def products(a: Real, b: Real) -> Real:
     """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ...), for a, b (2, ...)."""
     return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])
+
+
+@dataclass(frozen=True, eq=False)
+class GainField:
+    """The path gain of a hop over the map: its law about the station, and what lies above it.
+
+    In natural logarithms, at a place w of the aircraft in slot n,
+
+        l_n(w) = law(||w - p_n||^2 + H^2) + above(w)
+
+    with H the `height` of the aircraft above the station, m, and p_n the `station`: (2,), or (n, 2)
+    where it moves, its places in the n slots, m. `above` are dB of a map, by default nothing.
+
+    >>> field = GainField(PathGain(1e-5), np.array([0.0, 30.0]), 40.0)
+    >>> (field.log(np.array([[0.0], [0.0]])) / PER_DB).round(2)  # d = 50 m
+    array([-83.98])
+    """
+
+    law: GainFunction
+    station: Real
+    height: float
+    above: Grid | Spline | None = None
+
+    @property
+    def midway(self) -> Real:
+        """Where the station is at half the time of the flight (2,), m."""
+        p, n = self.station, len(self.station)
+        return p if p.ndim == 1 else (p[(n - 1) // 2] + p[n // 2]) / 2
+
+    def in_slots(self, chosen: Integers | int) -> "GainField":
+        """Return the field with the places of the station in the slots `chosen` (k,) or ()."""
+        return self if self.station.ndim == 1 else replace(self, station=self.station[chosen])
+
+    def smoothed(self) -> "GainField":
+        """Return the field with its map as the optimiser searches on it."""
+        smooth = self.above.smoothed() if isinstance(self.above, Grid) else self.above
+        return replace(self, above=smooth)
+
+    def away(self, w: Real) -> Real:
+        """Return w - p (2, ..., n) at positions w (2, ..., n), m."""
+        return w - self.station.T.reshape(2, *[1] * (w.ndim - 2), -1)
+
+    def squared_distance(self, away: Real) -> Real:
+        """Return d² (...), m², of the antennas at w - p = `away` (2, ...)."""
+        return np.asarray(np.sum(away**2, axis=0) + self.height**2)
+
+    def log(self, w: Real) -> Real:
+        """Return l (..., n) at positions w (2, ..., n), m."""
+        found = self.law.log(self.squared_distance(self.away(w)), self.height)
+        return found if self.above is None else found + PER_DB * self.above.value(*w)
+
+    def gain(self, w: Real) -> Real:
+        """Return the linear gain (..., n) at positions w (2, ..., n), m."""
+        found = self.law.gain(self.squared_distance(self.away(w)), self.height)
+        return found if self.above is None else found * np.exp(PER_DB * self.above.value(*w))
+
+    def slopes(self, w: Real) -> tuple[Real, Real]:
+        """Return gradient (2, ..., n) and Hessian xx, xy, yy (3, ..., n) of l by w (2, ..., n)."""
+        away = self.away(w)
+        gradient, hessian = self.law.slopes(away, self.squared_distance(away), self.height)
+        if self.above is not None:
+            _, x, y, xx, xy, yy = self.above.by_both(*w)
+            gradient = gradient + PER_DB * np.stack([x, y])
+            hessian = hessian + PER_DB * np.stack([xx, xy, yy])
+        return gradient, hessian
+
+    def extremes(self, farthest: float) -> tuple[float, float]:
+        """Return what l is not below and not above up to `farthest` m from the station."""
+        found = self._by_law(self.law.turns(farthest, self.height))
+        above = PER_DB * self.above.values if isinstance(self.above, Grid) else np.zeros(1)
+        return float(found.min() + above.min()), float(found.max() + above.max())
+
+    def most_between(self, near: Real, far: Real) -> Real:
+        """Return the most of l (...) by the law at distances from `near` to `far` (...), m."""
+        most = np.maximum(self._by_law(near), self._by_law(far))
+        for turn in self.law.turns(float(far.max()), self.height)[1:-1]:
+            most = np.where(
+                (near < turn) & (turn < far), np.maximum(most, self._by_law(turn)), most
+            )
+        return most
+
+    def _by_law(self, distance: Real) -> Real:
+        """Return l (...) by the law at distances on the ground (...), m."""
+        return np.asarray(self.law.log(distance**2 + self.height**2, self.height))

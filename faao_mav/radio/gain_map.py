@@ -7,10 +7,11 @@ spline, which rounds its edges over a cell.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.spline import Spline
@@ -100,7 +101,7 @@ class GainMap:
         return np.asarray((1 - share) * self.db[low] + share * self.db[high])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Grid:
     """A bilinear function f, `values` (k, m) on the even grids `x` (k,) and `y` (m,), m.
 
@@ -118,20 +119,18 @@ class Grid:
 
     def value(self, x: Real, y: Real) -> Real:
         """Return f at x (...) and y (...)."""
-        (i, s), (j, t) = _located(self.x, x), _located(self.y, y)
-        f = self.values
-        low = (1 - t) * f[i, j] + t * f[i, j + 1]
-        return np.asarray((1 - s) * low + s * ((1 - t) * f[i + 1, j] + t * f[i + 1, j + 1]))
+        return self._pieces.value(x, y)
 
     def by_both(self, x: Real, y: Real) -> tuple[Real, Real, Real, Real, Real, Real]:
         """Return f, f_x, f_y, f_xx, f_xy and f_yy, within the cells."""
-        (i, s), (j, t) = _located(self.x, x), _located(self.y, y)
-        f, dx, dy = self.values, self.x[1] - self.x[0], self.y[1] - self.y[0]
-        near, far = f[i, j + 1] - f[i, j], f[i + 1, j + 1] - f[i + 1, j]
-        f_x = ((1 - t) * (f[i + 1, j] - f[i, j]) + t * (f[i + 1, j + 1] - f[i, j + 1])) / dx
-        f_y = ((1 - s) * near + s * far) / dy
-        none = np.zeros_like(f_x)
-        return self.value(x, y), f_x, f_y, none, (far - near) / (dx * dy), none
+        return self._pieces.by_both(x, y)
+
+    @cached_property
+    def _pieces(self) -> Spline:
+        f, dy = self.values, self.y[1] - self.y[0]
+        f_x, f_y = np.diff(f, axis=0) / (self.x[1] - self.x[0]), np.diff(f, axis=1) / dy
+        cells = np.array([[np.diff(f_x, axis=1) / dy, f_y[:-1]], [f_x[:, :-1], f[:-1, :-1]]])
+        return Spline(self.x, self.y, cells.reshape(2, 2, -1))
 
     def most_between(self, x: Real, y: Real) -> Real:
         """Return the most of f in the boxes between rising x (i + 1,) and y (j + 1,), (i, j), m."""
@@ -158,13 +157,6 @@ class Grid:
             smooth = correlate1d(smooth, _B_SPLINE, axis, mode="nearest")
         x, y = (_widened(side, _BEYOND) for side in (self.x, self.y))
         return Spline.through(x, y, smooth)
-
-
-def _located(grid: Real, x: Real) -> tuple[Integers, Real]:
-    """Return the cells of x (...) on an even grid, and the share of a cell that x is into it."""
-    at = np.clip((x - grid[0]) / (grid[1] - grid[0]), 0.0, len(grid) - 1.0)
-    cell = np.minimum(at.astype(np.intp), len(grid) - 2)
-    return cell, at - cell
 
 
 def _widened(side: Real, points: int = 1) -> Real:

@@ -1,7 +1,7 @@
 """Files of gain maps: NumPy archives (.npz), tables (.csv) and GeoTIFF, read without trust.
 
 A plan's text holds its maps as one word each, so that it stands without their files: the archive,
-with decibels and metres in hundredths, in base64.
+of seven digits, in base64.
 """
 
 import base64
@@ -16,9 +16,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.files import read_text
+from faao_mav.files import read_columns, read_text
 from faao_mav.radio.archive import read_archive, unpacked
-from faao_mav.radio.columns import read_columns
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.raster import read_raster
 
@@ -48,12 +47,6 @@ _UNEVEN = 0.01
 _SAME = 6
 """Decimals of the metres by which rows of a table are at one place: the micrometre."""
 
-_ROUNDED = {_GAIN, _ABOVE, "ground"}
-"""What is in hundredths in a plan's text, each as the difference from the one before."""
-
-_NONE = np.iinfo(np.int32).min
-"""What stands for NaN there."""
-
 
 def read_map(path: str | Path) -> GainMap:
     """Return the map in the file `path`, .npz, .csv, .tif or .tiff.
@@ -71,17 +64,14 @@ def read_map(path: str | Path) -> GainMap:
     raise InputError(f"{path}: expected a map in a file that ends in .npz, .csv, .tif or .tiff")
 
 
-def map_archive(found: GainMap, *, rounded: bool = False) -> bytes:
-    """Return the content of a file .npz with a map, or of what is in a plan's text."""
+def map_archive(found: GainMap, kind: type[np.floating[Any]] = np.float64) -> bytes:
+    """Return the content of a file .npz with a map, dB and ground as numbers of a `kind`."""
     arrays: dict[str, Any] = {"east": found.east, "north": found.north, "height": found.heights}
-    arrays[_ABOVE if found.above_law else _GAIN] = found.db
+    arrays[_ABOVE if found.above_law else _GAIN] = found.db.astype(kind)
     if found.ground is not None:
-        arrays["ground"] = found.ground
+        arrays["ground"] = found.ground.astype(kind)
     if found.origin:
         arrays["origin"] = np.array(found.origin)
-    for key in _ROUNDED & arrays.keys() if rounded else ():
-        whole = np.where(np.isnan(arrays[key]), _NONE, np.rint(100.0 * arrays[key]))
-        arrays[key] = np.diff(whole.astype(np.int32), prepend=np.int32(0))
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
@@ -89,7 +79,7 @@ def map_archive(found: GainMap, *, rounded: bool = False) -> bytes:
 
 def map_word(found: GainMap) -> str:
     """Return a map as one word of a plan's text."""
-    return WORD + base64.b64encode(map_archive(found, rounded=True)).decode()
+    return WORD + base64.b64encode(map_archive(found, np.float32)).decode()
 
 
 @lru_cache(maxsize=16)
@@ -100,10 +90,7 @@ def map_of_word(word: str, origin: tuple[float, float, float] | None = None) -> 
     """
     try:
         content = base64.b64decode(word[len(WORD) :], validate=True)
-        arrays: dict[str, Any] = dict(unpacked(io.BytesIO(content), _KEYS) or {})
-        for key in _ROUNDED & arrays.keys():
-            whole = np.cumsum(arrays[key].astype(np.int32, casting="safe"), -1, np.int32)
-            arrays[key] = np.where(whole == _NONE, np.nan, whole / 100.0)
+        arrays = unpacked(io.BytesIO(content), _KEYS) or {}
     except Exception as error:  # as of an archive
         raise InputError("not the numbers of a map; expected the name of a file") from error
     read = _checked(arrays, "the map")

@@ -4,6 +4,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -36,9 +37,7 @@ _WORDS = {
 }
 """What a table's header may call its columns, of which the last four are levels."""
 
-_LEVELS = ("rsrp", "rssi", "snr", "throughput")
-
-_NONE: Mapping[str, str] = MappingProxyType({})
+_PLACES, _LEVELS = tuple(_WORDS)[:4], tuple(_WORDS)[4:]
 
 _DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0}
 _UNITS: Mapping[str, Mapping[str, float]] = {
@@ -82,7 +81,7 @@ class Measured:
 def read_measured(
     path: str | Path,
     station: Sequence[float],
-    units: Mapping[str, str] = _NONE,
+    units: Mapping[str, str] = MappingProxyType({}),
     calibration: Calibration = (),
 ) -> Measured:
     r"""Return the flight in the table `path`: time, latitude, longitude, altitude and one level.
@@ -116,25 +115,15 @@ def read_measured(
     except csv.Error as error:
         raise InputError(f"{path}: {error}; expected rows of numbers") from None
     level = next(name for name in columns if name in _LEVELS)
-    scaled = {
-        name: values * _UNITS[name][unit_of[name]]
-        for name, values in zip(columns, rows.T, strict=True)
-    }
-    unit = unit_of[level]
     sound = np.isfinite(rows).all(axis=1)
-    kept = {name: values[sound] for name, values in scaled.items()}
     if not sound.any():
         raise InputError(f"{path}: no row with {', '.join(columns)}; expected the rows of a flight")
-    kept[level], unit = level_of(path, kept[level], unit, calibration)
-    samples = samples_at(
-        path,
-        station,
-        kept["time"],
-        kept["latitude"],
-        kept["longitude"],
-        kept["altitude"],
-        kept[level],
-    )
+    kept = {
+        name: values * _UNITS[name][unit_of[name]]
+        for name, values in zip(columns, rows[sound].T, strict=True)
+    }
+    told, unit = level_of(path, kept[level], unit_of[level], calibration)
+    samples = samples_at(path, station, [kept[name] for name in _PLACES], told)
     return Measured(samples, unit, int(np.sum(~sound)))
 
 
@@ -165,16 +154,12 @@ def level_of(path: Path, told: Real, unit: str, calibration: Calibration = ()) -
     return told, unit
 
 
-def samples_at(
-    path: Path,
-    station: Sequence[float],
-    t: Real,
-    latitude: Real,
-    longitude: Real,
-    altitude: Real,
-    level: Real,
-) -> Samples:
-    """Return levels (k,) at places of the log `path` as `Samples`; see `read_measured`."""
+def samples_at(path: Path, station: Sequence[float], at: Sequence[Real], level: Real) -> Samples:
+    """Return levels (k,) of the log `path` as `Samples`; see `read_measured`.
+
+    `at` are their times, s, latitudes and longitudes, degrees, and altitudes, m, each (k,).
+    """
+    t, latitude, longitude, altitude = at
     if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
         raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
     local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
@@ -201,9 +186,7 @@ def _columns(
             continue
         columns[name] = number
         unit_of[name] = units.get(name, "_".join(words[1:])).lower()
-    missing = [
-        name for name in ("time", "latitude", "longitude", "altitude") if name not in columns
-    ]
+    missing = [name for name in _PLACES if name not in columns]
     levels = [name for name in columns if name in _LEVELS]
     if missing or not levels:
         missing += [] if levels else ["one of " + ", ".join(_LEVELS)]
@@ -227,14 +210,11 @@ def _numbers(rows: Iterable[list[str]], columns: Mapping[str, int], *, comma: bo
 
     def number(row: list[str], name: str) -> float:
         text = row[columns[name]].strip() if columns[name] < len(row) else ""
-        try:
+        with suppress(ValueError):
             return float(text.replace(",", ".") if comma else text)
-        except ValueError:
-            pass
-        try:
+        with suppress(ValueError):
             return datetime.fromisoformat(text).timestamp() if name == "time" else math.nan
-        except ValueError:
-            return math.nan
+        return math.nan
 
     found = [[number(row, name) for name in columns] for row in rows]
     return np.array(found, dtype=np.float64).reshape(-1, len(columns))

@@ -14,7 +14,7 @@ HEIGHTS = st.floats(-300, 300).filter(lambda H: abs(H) > 1)
 
 def test_the_default_is_the_inverse_square() -> None:
     squared = np.array([1e4, 500.0**2 + 100.0**2])
-    np.testing.assert_array_equal(PathGain(1e-5).gain(squared, 100.0), 1e-5 / squared)
+    np.testing.assert_allclose(PathGain(1e-5).gain(squared, 100.0), 1e-5 / squared, rtol=1e-14)
 
 
 @settings(deadline=None, derandomize=True)

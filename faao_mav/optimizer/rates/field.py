@@ -12,8 +12,7 @@ from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
-from faao_mav.radio.gain import PER_DB
-from faao_mav.radio.gain_field import GainField
+from faao_mav.radio.gain import PER_DB, GainField
 from faao_mav.radio.rate_steps import RateSteps
 
 

@@ -9,8 +9,8 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import RatePartials
-from faao_mav.radio.class_sum import class_sum
-from faao_mav.radio.quadratic_form import coordinates
+from faao_mav.radio.constellation import coordinates
+from faao_mav.radio.rate import class_sum
 
 _LN2 = float(np.log(2.0))
 

@@ -19,8 +19,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.problem import Link, Problem
 from faao_mav.optimizer.search.best_rates import BestRates
 from faao_mav.optimizer.search.sweep import CORNER, Cells, cells_of, disc, largest_near
-from faao_mav.radio.gain import PER_DB
-from faao_mav.radio.gain_field import GainField
+from faao_mav.radio.gain import PER_DB, GainField
 from faao_mav.radio.gain_map import Grid
 
 _DIRECTIONS = 3

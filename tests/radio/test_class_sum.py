@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.radio import square_sum
-from faao_mav.radio.constellation import constellation, difference_classes
-from faao_mav.radio.quadratic_form import coordinates, features
-from faao_mav.radio.square_sum import SquareSum
+from faao_mav.radio import rate
+from faao_mav.radio.constellation import constellation, coordinates, difference_classes, features
+from faao_mav.radio.rate import SquareSum
 
 
 def pair_sums(modulation: str, antennas: int, Z: Complex) -> Real:
@@ -37,12 +36,11 @@ def test_sums_over_all_differences(
     A[6, :, -1] *= 30.0
     Z = A.conj().mT @ A
     classes = difference_classes(modulation, antennas)
-    assert classes.part_differences is not None
-    sums = SquareSum(classes.part_differences, antennas, classes.symbols)
+    sums = SquareSum(classes)
     expected = pair_sums(modulation, antennas, Z)
     scale = np.abs(expected).max(axis=1, keepdims=True)
     for block in (1, 1 << 18):
-        monkeypatch.setattr(square_sum, "_BLOCK", block)
+        monkeypatch.setattr(rate, "_BLOCK", block)
         found = sums.sums(coordinates(Z), 1 + antennas**2)
         np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(sums.sums(coordinates(Z), 1), found[:, :1], rtol=1e-12)
