@@ -30,10 +30,8 @@ def geofence(contents: PlanFile, source: str) -> Fence:
     origin = contents.site.origin
     frame = LocalFrame(origin.latitude, origin.longitude)
     of_file = _read(options, source, frame)
-    zones = [
-        *((zone, True) for zone in options.inclusion),
-        *((zone, False) for zone in options.exclusion),
-    ]
+    zones = [(zone, True) for zone in options.inclusion]
+    zones += [(zone, False) for zone in options.exclusion]
     polygons = [
         Polygon(_degrees(frame, zone.polygon), inclusion)
         for zone, inclusion in zones

@@ -27,17 +27,11 @@ from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.map_file import WORD, map_of_word
 from faao_mav.radio.rate_steps import RateSteps
 
-Modulation: TypeAlias = Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"]
-LineOfSight: TypeAlias = Literal["ula", "all_ones"]
-Fading: TypeAlias = Literal["ergodic", "realization", "none"]
-ChannelKnowledge: TypeAlias = Literal["statistical", "instantaneous"]
-Duplex: TypeAlias = Literal["full", "half"]
-
 _Rate: TypeAlias = Annotated[Number, Field(ge=0, le=1e6)]
 _Angle: TypeAlias = Annotated[Number, Field(ge=0, le=90)]
 _Distance: TypeAlias = Annotated[Number, Field(gt=0)]
 
-_POWER, _NOISE, _GAIN = watts(20), watts(-80), linear(-50)
+_POWER, _NOISE = watts(20), watts(-80)
 
 
 def _map(value: object, info: ValidationInfo) -> GainMap:
@@ -162,14 +156,16 @@ class Radio:
     base_station: BaseStation
     relay: Relay = field(default_factory=Relay)
     ground_user: GroundUser
-    modulation: Modulation = key("The alphabet of both hops.", default="bpsk")
+    modulation: Literal["bpsk", "qpsk", "8psk", "16qam", "64qam"] = key(
+        "The alphabet of both hops.", default="bpsk"
+    )
     rates: RadioRates | None = key(
         "The radio's own rates, of one stream, in place of the alphabet's.",
         accepted="a mapping with snr_db and mbit_per_s or bit_per_s_per_hz, or the name of a .csv",
         default=None,
     )
     reference_gain: Gain = key(
-        "Power gain rho_0 at 1 m.", "dB", name="reference_gain_db", default=_GAIN
+        "Power gain rho_0 at 1 m.", "dB", name="reference_gain_db", default=linear(-50)
     )
     gain: GainLaw = key(
         "Path gain of both hops, in dB over distance and elevation.",
@@ -182,11 +178,11 @@ class Radio:
         default=None,
     )
     rician_factor: Number = key("Rician factor K, linear.", "[0, 1e6]", default=3.0)
-    line_of_sight: LineOfSight = key(
+    line_of_sight: Literal["ula", "all_ones"] = key(
         "ula: half-wavelength arrays along east, follows the aircraft; all_ones: ones.",
         default="ula",
     )
-    fading: Fading = key(
+    fading: Literal["ergodic", "realization", "none"] = key(
         "ergodic: the mean over fading; realization: one known draw per slot, as in the paper; "
         "none: the line of sight alone.",
         default="ergodic",
@@ -194,7 +190,7 @@ class Radio:
     fading_samples: Whole = key(
         "Draws that the mean over fading is taken over.", "[1, 10000]", default=32
     )
-    csi: ChannelKnowledge = key(
+    csi: Literal["statistical", "instantaneous"] = key(
         "Ergodic fading: one precoder per slot (statistical) or per draw (instantaneous).",
         default="statistical",
     )
@@ -206,7 +202,7 @@ class Radio:
         "false: for R_avg, as in the paper.",
         default=True,
     )
-    duplex: Duplex = key(
+    duplex: Literal["full", "half"] = key(
         "full: two bands, one for each hop; half: both hops share the time of each slot.",
         default="full",
     )

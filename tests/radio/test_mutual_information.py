@@ -34,17 +34,6 @@ def by_hermite(A: Complex, modulation: str, order: int) -> float:
     return float(np.log2(len(y)) - loss)
 
 
-def test_single_antenna_oracle() -> None:
-    for modulation, decibels, expected in (
-        ("bpsk", 0, 0.721452),
-        ("bpsk", 5, 0.976176),
-        ("qpsk", 0, 0.971888),
-        ("qpsk", 5, 1.718388),
-    ):
-        found = mutual_information(ONE, ONE, modulation, 10 ** (-decibels / 10))
-        assert found[0] == pytest.approx(expected, abs=2e-3)
-
-
 # As for the cutoff rate: unit noise, H = [2 1; 1 1] √(snr/2), P = I with tr(P^H P) = W = 2.
 @pytest.mark.figures
 @pytest.mark.parametrize(

@@ -15,18 +15,6 @@ def channel(seed: int, *shape: int) -> Complex:
     return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
 
 
-@pytest.mark.parametrize(
-    ("modulation", "decibels", "expected"),
-    [("bpsk", 0, 0.548059), ("bpsk", 5, 0.940189), ("qpsk", 0, 0.632103), ("qpsk", 5, 1.460161)],
-)
-def test_single_antenna_oracle(modulation: str, decibels: float, expected: float) -> None:
-    one = np.ones((1, 1))
-    classes = difference_classes(modulation, 1)
-    assert cutoff_rate(one, one, classes, 10 ** (-decibels / 10)) == pytest.approx(
-        expected, abs=5e-7
-    )
-
-
 # The table's SNR is per stream with H divided by √2: unit noise, H = [2 1; 1 1] √(snr/2), and
 # P = I, so tr(P^H P) = W = 2. The closed form is scaled to the same W = 2.
 @pytest.mark.figures
