@@ -28,9 +28,7 @@ class PowerOptions:
         "Copter: power in hover; with cruise_w and at.", "(0, 1e6] W", default=None
     )
     cruise_w: Number | None = key(
-        "Power at the airspeed `at`; of a plane at that of longest range.",
-        "(0, 1e6] W",
-        default=None,
+        "Power at airspeed `at`; of a plane at that of longest range.", "(0, 1e6] W", default=None
     )
     at: Number | None = key("Airspeed of cruise_w.", "(0, 1000] m/s", default=None)
     mass: Number | None = key(
@@ -70,10 +68,7 @@ class Battery:
 
     capacity_wh: Number = key("Energy of the full battery.", "(0, 1e6] Wh")
     reserve: Annotated[Number, BeforeValidator(_percent)] = key(
-        "Share that has to be left after landing.",
-        "[0, 99] %",
-        "a percentage, 0 to 99",
-        default=20.0,
+        "Share to be left after landing.", "[0, 99] %", "a percentage, 0 to 99", default=20.0
     )
 
     @property

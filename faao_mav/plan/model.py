@@ -38,11 +38,7 @@ class PlanFile:
     """What the file of a plan holds."""
 
     name: Text = key(
-        "Name, for the summary.",
-        "",
-        "one line of at most 200 printable characters",
-        max_length=200,
-        default="",
+        "Name.", "", "one line of at most 200 printable characters", max_length=200, default=""
     )
     site: Site
     vehicle: VehicleOptions

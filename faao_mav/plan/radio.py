@@ -132,9 +132,7 @@ class Relay:
     power: Power = key("Transmit power W_U.", "dBm", name="power_dbm", default=_POWER)
     noise: Noise = key("Noise power sigma_U^2.", "dBm", name="noise_dbm", default=_NOISE)
     buffer_mbytes: Number | None = key(
-        "What the relay can hold (needs radio.bandwidth_mhz); null: any amount.",
-        "(0, 1e9] megabytes",
-        default=None,
+        "What it holds (needs radio.bandwidth_mhz); null: any.", "(0, 1e9] megabytes", default=None
     )
 
 
@@ -168,9 +166,7 @@ class Radio:
         "Power gain rho_0 at 1 m.", "dB", name="reference_gain_db", default=linear(-50)
     )
     gain: GainLaw = key(
-        "Path gain of both hops, in dB over distance and elevation.",
-        accepted=_GAIN_FILE,
-        default_factory=GainLaw,
+        "Path gain of both hops, in dB by place.", accepted=_GAIN_FILE, default_factory=GainLaw
     )
     reliability: Number | None = key(
         "Share of shadowings in which at least what is maximised arrives; null: plan for the mean.",
@@ -179,8 +175,7 @@ class Radio:
     )
     rician_factor: Number = key("Rician factor K, linear.", "[0, 1e6]", default=3.0)
     line_of_sight: Literal["ula", "all_ones"] = key(
-        "ula: half-wavelength arrays along east, follows the aircraft; all_ones: ones.",
-        default="ula",
+        "ula: half-wavelength arrays along east, follows the UAV; all_ones: ones.", default="ula"
     )
     fading: Literal["ergodic", "realization", "none"] = key(
         "ergodic: the mean over fading; realization: one known draw per slot, as in the paper; "
@@ -191,8 +186,7 @@ class Radio:
         "Draws that the mean over fading is taken over.", "[1, 10000]", default=32
     )
     csi: Literal["statistical", "instantaneous"] = key(
-        "Ergodic fading: one precoder per slot (statistical) or per draw (instantaneous).",
-        default="statistical",
+        "Ergodic: a precoder per slot (statistical) or draw (instantaneous).", default="statistical"
     )
     seed: Whole = key(
         "Seed of the draws.", accepted="a whole number from 0", ge=0, lt=2**63, default=0
@@ -203,8 +197,7 @@ class Radio:
         default=True,
     )
     duplex: Literal["full", "half"] = key(
-        "full: two bands, one for each hop; half: both hops share the time of each slot.",
-        default="full",
+        "full: a band for each hop; half: both hops share the time of each slot.", default="full"
     )
     bandwidth_mhz: Number | None = key(
         "Bandwidth of a hop, to tell rates in Mbit/s and flights in megabytes; null: not told.",

@@ -74,9 +74,7 @@ class Wind:
 
     speed: Number = key("Mean speed of the wind.", "[0, 50] m/s")
     from_degrees: Number = key(
-        "Where the wind comes from, clockwise from north: 270 is a west wind.",
-        "[0, 360] degrees",
-        name="from",
+        "Where it comes from, clockwise from north: 270 is west.", "[0, 360] degrees", name="from"
     )
     gust: Number = key(
         "Speed of the wind in gusts; below `speed`: no gusts.", "[0, 100] m/s", default=0.0
@@ -204,8 +202,7 @@ class Flight:
         name="altitude",
     )
     duration: Number = key(
-        "Duration T, a whole number of time steps; w_F is reached one step before its end.",
-        "(0, 1e7] s",
+        "Duration T, in whole time steps; w_F is reached one step before its end.", "(0, 1e7] s"
     )
     time_step: Number = key("Length delta_t of a time slot.", "(0, 1e6] s", default=0.2)
     start_velocity: Velocity = key("Velocity at the start; the paper: free.", "m/s", default=_HOVER)
@@ -236,12 +233,10 @@ class Optimizer:
         "The precoders that the route is for.", default="faao"
     )
     inputs: Literal["alphabet", "gaussian"] = key(
-        "Inputs that the design is for; what is reported is the alphabet's rate.",
-        default="alphabet",
+        "Inputs that the design is for; what is told is the alphabet's rate.", default="alphabet"
     )
     rate: Literal["cutoff", "mutual_information"] = key(
-        "The rate that counts: what every code carries, or what the best come near to.",
-        default="cutoff",
+        "The rate that counts: what any code carries, or what the best approach.", default="cutoff"
     )
     starts: tuple[Literal["straight", "global", "bs", "user", "bs-user", "user-bs"], ...] = key(
         "Routes that the direct method starts from.",
@@ -269,9 +264,7 @@ class Goal:
         "What is maximised: the rate, or the data within energy_wh.", default=None
     )
     energy_wh: Number | None = key(
-        "Energy of the planned flight and its relay (needs vehicle.power).",
-        "(0, 1e6] Wh",
-        default=None,
+        "Energy of the flight and its relay (needs vehicle.power).", "(0, 1e6] Wh", default=None
     )
     minimise: Literal["duration", "power", "energy"] | None = key(
         "What is minimised: the duration in whole time steps, both powers by the same dB, or "

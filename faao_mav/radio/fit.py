@@ -80,11 +80,10 @@ class Samples:
         That is against fast fading. In flight is above half the median height; what is not finite
         is left out.
         """
+        up = self.place[:, 2]
         sound = np.isfinite(self.t) & np.isfinite(self.level) & np.isfinite(self.place).all(axis=1)
-        sound &= self.place[:, 2] > 0.0
-        if not sound.any():
-            return Samples(self.t[:0], self.place[:0], self.level[:0], self.source)
-        sound &= self.place[:, 2] > 0.5 * np.median(self.place[sound, 2])
+        sound &= up > 0.0
+        sound &= up > (0.5 * np.median(up[sound]) if sound.any() else 0.0)
         t, place, power = self.t[sound], self.place[sound], 10.0 ** (self.level[sound] / 10.0)
         _, group, count = np.unique(np.floor(t / seconds), return_inverse=True, return_counts=True)
 
