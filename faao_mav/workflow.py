@@ -438,9 +438,5 @@ def draw_mission(solution: Solution, conversion: Conversion) -> str:
             moving[name] = list(zip(moments, way, strict=True))
         else:
             stations[name] = way[0]
-    return write_kml(
-        conversion.mission,
-        name=plan.name or "relay flight",
-        stations=stations,
-        moving=moving,
-    )
+    title = plan.name or "relay flight"
+    return write_kml(conversion.mission, name=title, stations=stations, moving=moving)

@@ -119,9 +119,7 @@ class BaseStation(Station):
 
     antennas: Antennas = key("Antennas N_t.", default=2)
     power: Power = key("Transmit power W_B.", "dBm", name="power_dbm", default=_POWER)
-    gain: GainLaw | None = key(
-        "Path gain of this hop, if another.", accepted=_GAIN_FILE, default=None
-    )
+    gain: GainLaw | None = key("Own path gain of this hop.", accepted=_GAIN_FILE, default=None)
 
 
 @section
@@ -142,9 +140,7 @@ class GroundUser(Station):
 
     antennas: Antennas = key("Antennas N_r.", default=2)
     noise: Noise = key("Noise power sigma_G^2.", "dBm", name="noise_dbm", default=_NOISE)
-    gain: GainLaw | None = key(
-        "Path gain of this hop, if another.", accepted=_GAIN_FILE, default=None
-    )
+    gain: GainLaw | None = key("Own path gain of this hop.", accepted=_GAIN_FILE, default=None)
 
 
 @section
@@ -182,15 +178,11 @@ class Radio:
         "none: the line of sight alone.",
         default="ergodic",
     )
-    fading_samples: Whole = key(
-        "Draws that the mean over fading is taken over.", "[1, 10000]", default=32
-    )
+    fading_samples: Whole = key("Draws of the mean over fading.", "[1, 10000]", default=32)
     csi: Literal["statistical", "instantaneous"] = key(
         "Ergodic: a precoder per slot (statistical) or draw (instantaneous).", default="statistical"
     )
-    seed: Whole = key(
-        "Seed of the draws.", accepted="a whole number from 0", ge=0, lt=2**63, default=0
-    )
+    seed: Whole = key("Seed of draws.", accepted="a whole number from 0", ge=0, lt=2**63, default=0)
     causal: Flag = key(
         "true: plan for what is delivered by a relay that forwards only what it has received; "
         "false: for R_avg, as in the paper.",

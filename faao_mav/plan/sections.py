@@ -76,9 +76,7 @@ class Wind:
     from_degrees: Number = key(
         "Where it comes from, clockwise from north: 270 is west.", "[0, 360] degrees", name="from"
     )
-    gust: Number = key(
-        "Speed of the wind in gusts; below `speed`: no gusts.", "[0, 100] m/s", default=0.0
-    )
+    gust: Number = key("Speed in gusts; below `speed`: no gusts.", "[0, 100] m/s", default=0.0)
 
     @property
     def velocity(self) -> Vector:
@@ -112,10 +110,8 @@ def _body_of(value: object, info: ValidationInfo) -> Body | None:
     if known.body is None:
         raise told(f"no flight model of {known.family.key} {known.kind} reads it; give sitl")
     own: dict[str, Any] = asdict(known.body)
-    if foreign := [name for name in value if name in _NUMBERS and name not in own]:
-        raise told(
-            f"{foreign[0]} is not of a {known.kind}'s body, which has {listed([*own], 'and')}"
-        )
+    if other := [name for name in value if name in _NUMBERS and name not in own]:
+        raise told(f"{other[0]} is not of a {known.kind}'s body, which has {listed([*own], 'and')}")
     body = TypeAdapter(type(known.body)).validate_python({**own, **value})
     return body if body != known.body else None
 
@@ -296,15 +292,11 @@ class MissionOptions:
     """How the trajectory becomes a mission."""
 
     takeoff: Flag = key("Whether the mission begins with a take-off.", default=True)
-    on_finish: Literal["rtl", "land", "hover"] = key(
-        "What the aircraft does at the end.", default="rtl"
-    )
+    on_finish: Literal["rtl", "land", "hover"] = key("What is done at the end.", default="rtl")
     path_tolerance: Number = key(
         "Largest distance of the predicted flight from the path.", "[0.1, 1000] m", default=2.0
     )
-    max_items: Whole = key(
-        "Most items of the mission, the home row included.", "[2, 65535]", default=600
-    )
+    max_items: Whole = key("Most mission items, the home row included.", "[2, 65535]", default=600)
     parameters: Literal["recommend", "keep"] = key(
         "recommend: time the mission for limits that suit it, and write them beside it; "
         "keep: fit it to the vehicle's.",

@@ -73,6 +73,4 @@ class FenceOptions:
         accepted="the name of a .plan, .kml or .geojson file",
         default=None,
     )
-    margin: Number = key(
-        "Distance from the edge that the planned path keeps.", "[0, 10000] m", default=5.0
-    )
+    margin: Number = key("Distance that the plan keeps from the edge.", "[0, 10000] m", default=5.0)

@@ -185,11 +185,7 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
 def as_map(plot: "Axes", plan: Plan, title: str) -> None:
     """Make `plot`, whose figure has all else, a map with the stations and the ends of `plan`."""
     flight, t = plan.flight, plan.flight.time_step * np.arange(float(plan.flight.slots))
-    ways: list[Any] = [
-        *(station.at(t) for station in plan.radio.stations),
-        [flight.start],
-        [flight.end],
-    ]
+    ways: list[Any] = [*(each.at(t) for each in plan.radio.stations), [flight.start], [flight.end]]
     places = list(zip(("base station", "user", "start", "end"), ways, "s^oo", strict=True))
     plot.plot(*np.concatenate(ways).T, linestyle="none")
     plot.set_aspect("equal", adjustable="datalim")
