@@ -1,10 +1,20 @@
-"""Closed forms that the tests hold the package to."""
+"""Closed forms that the tests hold the package to, and channels to hold it to them."""
 
 import numpy as np
 
-from faao_mav.arrays import Real, RealOrComplex
-from faao_mav.radio.constellation import DifferenceClasses, difference_classes
+from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.radio.constellation import difference_classes
 from faao_mav.radio.rate import exponents
+
+
+def channel(seed: int, *shape: int) -> Complex:
+    """Draws of CN(0, 1)."""
+    parts = np.random.default_rng(seed).standard_normal((2, *shape))
+    return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
+
+
+def power_of(P: Complex) -> Real:
+    return np.asarray(np.sum(np.abs(P) ** 2, axis=(-2, -1)))
 
 
 def bpsk_two_antennas_rate(H: RealOrComplex, power: float, noise: float) -> Real:
@@ -18,17 +28,13 @@ def bpsk_two_antennas_rate(H: RealOrComplex, power: float, noise: float) -> Real
     return np.asarray(-2.0 * np.log1p(0.5 * np.expm1(-x)) / np.log(2.0))[()]
 
 
-def log_nonzero_sum(D: Real, classes: DifferenceClasses) -> Real:
+def log_sum(H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float = 1.0) -> Real:
     """Return s = ln of the sum of multiplicity e^-D / rho^N: N log2(rho) - R_0 = log2(1 + e^s).
 
-    It is finite at any SNR, even where R_0 no longer tells two precoders apart. D is (..., k).
+    It is finite at any SNR, even where R_0 no longer tells two precoders apart.
     """
+    classes = difference_classes(modulation, P.shape[-1])
+    D = exponents(H, P, classes.vectors, noise)
     nearest = np.min(D, axis=-1)
     total = np.exp(nearest[..., None] - D) @ (classes.multiplicity / classes.symbols)
     return np.asarray(np.log(total) - nearest)[()]
-
-
-def log_sum(H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float = 1.0) -> Real:
-    """Return ``log_nonzero_sum`` of channels H and precoders P."""
-    classes = difference_classes(modulation, P.shape[-1])
-    return log_nonzero_sum(exponents(H, P, classes.vectors, noise), classes)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from closed_forms import bpsk_two_antennas_rate, log_sum
+from closed_forms import bpsk_two_antennas_rate, channel, log_sum, power_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
@@ -18,15 +18,6 @@ from faao_mav.radio.rate import Measure, cutoff_rate, draw_rates
 SETTINGS = settings(max_examples=15, deadline=None, derandomize=True)
 SEEDS = st.integers(0, 2**32 - 1)
 TABLE = np.array([[2.0, 1.0], [1.0, 1.0]]) * np.sqrt(0.5)
-
-
-def gaussian(seed: int, *shape: int) -> Complex:
-    parts = np.random.default_rng(seed).standard_normal((2, *shape))
-    return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
-
-
-def power_of(P: Complex) -> Real:
-    return np.asarray(np.sum(np.abs(P) ** 2, axis=(-2, -1)))
 
 
 def best(
@@ -46,14 +37,14 @@ def best(
 @pytest.mark.parametrize("measure", ["cutoff", "mutual_information"])
 @pytest.mark.parametrize(("modulation", "draws"), [("qpsk", 1), ("qpsk", 3), ("16qam", 2)])
 def test_no_other_precoder_near_it_is_better(measure: Measure, modulation: str, draws: int) -> None:
-    H = gaussian(3, 4, draws, 2, 2)
+    H = channel(3, 4, draws, 2, 2)
     P = best_precoders(H, 3.0, modulation, 1.0, measure=measure)
 
     def rate(P: Complex) -> Real:
         return np.asarray(draw_rates(measure, H, P[:, None], modulation, 1.0).mean(axis=1))
 
     for seed in range(20):
-        other = P + 0.02 * gaussian(seed, 4, 2, 2)
+        other = P + 0.02 * channel(seed, 4, 2, 2)
         other *= np.sqrt(3.0 / power_of(other))[:, None, None]
         # the slope of the mutual information at so many noises is nearly that of its value
         assert np.all(rate(other) < rate(P) + (1e-5 if measure == "cutoff" else 2e-3))
@@ -62,7 +53,7 @@ def test_no_other_precoder_near_it_is_better(measure: Measure, modulation: str, 
 @SETTINGS
 @given(seed=SEEDS, snr=st.floats(0.01, 100.0))
 def test_closed_forms(seed: int, snr: float) -> None:
-    H = gaussian(seed, 8, 2, 2)
+    H = channel(seed, 8, 2, 2)
     _, rate = best(H, snr, "bpsk")
     np.testing.assert_allclose(rate, bpsk_two_antennas_rate(H, snr, 1.0), rtol=1e-9)
     searched = best_precoders(np.stack([H, H], axis=1), snr, "bpsk", 1.0)
@@ -90,8 +81,8 @@ def test_never_below_the_classical_schemes(
     seed: int, modulation: str, shape: tuple[int, int], snr_db: float, tilt: float
 ) -> None:
     assume(shape[1] < 3 or modulation in ("bpsk", "qpsk"))
-    line_of_sight = gaussian(seed + 1, 3, shape[0], 1) @ gaussian(seed + 2, 3, 1, shape[1])
-    H = tilt * gaussian(seed, 3, *shape) + (1.0 - tilt) * line_of_sight
+    line_of_sight = channel(seed + 1, 3, shape[0], 1) @ channel(seed + 2, 3, 1, shape[1])
+    H = tilt * channel(seed, 3, *shape) + (1.0 - tilt) * line_of_sight
     W = 10.0 ** (snr_db / 10.0)
     _, rate = best(H, W, modulation)
     classes = difference_classes(modulation, shape[1])
@@ -117,7 +108,7 @@ def multistart(H: Complex, W: float, modulation: str, seed: int) -> float:
     [("qpsk", 1.0, 1), ("qpsk", 4.0, 2), ("qpsk", 12.0, 3), ("8psk", 8.0, 4), ("16qam", 5.0, 5)],
 )
 def test_as_good_as_many_random_starts(modulation: str, W: float, seed: int) -> None:
-    H = gaussian(seed, 2, 2)
+    H = channel(seed, 2, 2)
     found = float(log_sum(H, best(H, W, modulation)[0], modulation))
     assert found < multistart(H, W, modulation, seed) + 1e-3
 
@@ -132,7 +123,7 @@ def test_channels_that_lead_nowhere() -> None:
     _, rate = best(np.array([[1.0, 0.0]]), 2.0, "qpsk", start=np.array([[0.0, 0.0], [1.0, 1.0]]))
     assert rate > 0.5
     # a receiving antenna that hears nothing changes nothing
-    H = gaussian(7, 4, 1, 2)
+    H = channel(7, 4, 1, 2)
     silent = np.concatenate([H, np.zeros_like(H)], axis=1)
     np.testing.assert_allclose(best(silent, 2.0, "qpsk")[1], best(H, 2.0, "qpsk")[1], rtol=1e-5)
 
@@ -140,7 +131,7 @@ def test_channels_that_lead_nowhere() -> None:
 @pytest.mark.parametrize("modulation", ["bpsk", "qpsk", "16qam"])
 @pytest.mark.parametrize("snr", [1e-12, 1e-9, 1e-5, 1e4, 1e9])
 def test_extremes(modulation: str, snr: float) -> None:
-    H = gaussian(8, 4, 2, 2)
+    H = channel(8, 4, 2, 2)
     P, rate = best(H, snr, modulation)
     bits = difference_classes(modulation, 2).bits
     assert np.all(np.isfinite(log_sum(H, P, modulation)))
@@ -165,7 +156,7 @@ def test_a_start_is_never_worse(
     seed: int, snr_db: float, modulation: str, measure: Measure
 ) -> None:
     W = 10.0 ** (snr_db / 10.0)
-    H, start = gaussian(seed, 4, 2, 2, 2), gaussian(seed + 1, 4, 2, 2)
+    H, start = channel(seed, 4, 2, 2, 2), channel(seed + 1, 4, 2, 2)
     start *= np.sqrt(W / power_of(start))[:, None, None]
     P = best_precoders(H, W, modulation, 1.0, measure=measure, start=start)
     before, after = (
@@ -178,7 +169,7 @@ def test_a_start_is_never_worse(
 @pytest.mark.parametrize("W", [0.3, 3.0, 30.0])
 def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
     los = np.array([[1.0, 1.0], [1.0, np.exp(0.7j)]])
-    draws = (np.sqrt(3.0) * los + gaussian(14, 5, 32, 2, 2)) / 2.0
+    draws = (np.sqrt(3.0) * los + channel(14, 5, 32, 2, 2)) / 2.0
     classes = difference_classes(modulation, 2)
 
     def mean(P: Complex) -> Real:
@@ -195,7 +186,7 @@ def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
 
 
 def test_more_mutual_information_than_the_precoders_of_the_cutoff_rate() -> None:
-    H = gaussian(9, 6, 1, 2, 2) * np.linspace(0.4, 2.8, 6)[:, None, None, None]
+    H = channel(9, 6, 1, 2, 2) * np.linspace(0.4, 2.8, 6)[:, None, None, None]
     carried = [
         mutual_information(
             H, best_precoders(H, 1.5, "qpsk", 1.0, measure=measure)[:, None], "qpsk", 1.0

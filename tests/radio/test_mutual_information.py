@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_forms import channel
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -13,11 +14,6 @@ from faao_mav.radio.precoder import bpsk_two_antennas
 from faao_mav.radio.rate import cutoff_rate
 
 ONE = np.ones((1, 1, 1))
-
-
-def channel(seed: int, *shape: int) -> Complex:
-    parts = np.random.default_rng(seed).standard_normal((2, *shape))
-    return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
 
 
 def by_hermite(A: Complex, modulation: str, order: int) -> float:

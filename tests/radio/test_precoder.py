@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from closed_forms import bpsk_two_antennas_rate
+from closed_forms import bpsk_two_antennas_rate, channel, power_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.arrays import RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import difference_classes
 from faao_mav.radio.precoder import (
@@ -18,15 +18,6 @@ from faao_mav.radio.precoder import (
 from faao_mav.radio.rate import cutoff_rate
 
 SHAPES = [(1, 1), (2, 2), (3, 3), (1, 2), (2, 3), (2, 1), (4, 2), (3, 2)]
-
-
-def channel(seed: int, *shape: int) -> Complex:
-    parts = np.random.default_rng(seed).standard_normal((2, *shape))
-    return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
-
-
-def power_of(P: Complex) -> Real:
-    return np.asarray(np.sum(np.abs(P) ** 2, axis=(-2, -1)))
 
 
 def parallel(A: RealOrComplex, B: RealOrComplex) -> None:

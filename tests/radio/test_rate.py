@@ -1,18 +1,23 @@
+from itertools import product
+
 import numpy as np
 import pytest
+from closed_forms import channel
 
-from faao_mav.arrays import Complex
+from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
-from faao_mav.radio.constellation import difference_classes, symbol_vectors
+from faao_mav.radio import rate
+from faao_mav.radio.constellation import (
+    constellation,
+    coordinates,
+    difference_classes,
+    features,
+    symbol_vectors,
+)
 from faao_mav.radio.precoder import bpsk_two_antennas
-from faao_mav.radio.rate import cutoff_rate, exponents
+from faao_mav.radio.rate import SquareSum, cutoff_rate, exponents
 
 SMALL = [("bpsk", 1), ("bpsk", 2), ("bpsk", 3), ("qpsk", 2), ("8psk", 2), ("16qam", 2)]
-
-
-def channel(seed: int, *shape: int) -> Complex:
-    parts = np.random.default_rng(seed).standard_normal((2, *shape))
-    return np.asarray((parts[0] + 1j * parts[1]) * np.sqrt(0.5))
 
 
 # The table's SNR is per stream with H divided by √2: unit noise, H = [2 1; 1 1] √(snr/2), and
@@ -77,3 +82,40 @@ def test_noise_must_be_positive() -> None:
     for noise in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="noise"):
             exponents(np.eye(1), np.eye(1), np.ones((1, 1)), noise)
+
+
+def pair_sums(modulation: str, antennas: int, Z: Complex) -> Real:
+    """The sums over all differences of two vectors but 0, one after another, with u^H Z u."""
+    symbols = constellation(modulation)
+    values, counts = np.unique(np.round(symbols[:, None] - symbols, 13).ravel(), return_counts=True)
+    index = np.array(list(product(range(len(values)), repeat=antennas)))
+    u, pairs = values[index], counts[index].prod(axis=1)
+    pairs = np.where(np.any(u != 0.0, axis=1), pairs, 0) / float(len(symbols)) ** antennas
+    phi = features(u)
+    terms = np.column_stack([np.ones(len(u)), phi])
+    D = [np.sum(np.conj(u) * (u @ z.T), axis=1).real for z in Z]
+    return np.array([(pairs * np.exp(-d)) @ terms for d in D])
+
+
+@pytest.mark.parametrize(("modulation", "antennas"), [("16qam", 2), ("16qam", 3)])
+def test_sums_over_all_differences(
+    modulation: str, antennas: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    A = channel(5, 9, 3, antennas) * np.sqrt(2.0)
+    A *= np.array([0.05, 0.3, 1.0] * 3)[:, None, None]
+    A[1, :, 0] = 0.0  # a stream without power
+    A[2, :, 0] *= 1e-9
+    A[3] = A[3, :, :1] * (1.0 + np.arange(antennas))  # all streams on one mode
+    A[4] = 0.0
+    A[5] *= 1e-160
+    A[6, :, -1] *= 30.0
+    Z = A.conj().mT @ A
+    classes = difference_classes(modulation, antennas)
+    sums = SquareSum(classes)
+    expected = pair_sums(modulation, antennas, Z)
+    scale = np.abs(expected).max(axis=1, keepdims=True)
+    for block in (1, 1 << 18):
+        monkeypatch.setattr(rate, "_BLOCK", block)
+        found = sums.sums(coordinates(Z), 1 + antennas**2)
+        np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-10)
+        np.testing.assert_allclose(sums.sums(coordinates(Z), 1), found[:, :1], rtol=1e-12)
