@@ -38,20 +38,19 @@ def read_archive(
     """
     with opened(path) as file:
         try:
-            arrays = unpacked(file, names)
+            return unpacked(file, names)
         except OSError:  # `opened` tells it
             raise
+        except InputError as error:
+            raise InputError(f"{path}: {error}; expected {what}") from None
         except Exception as error:  # zipfile and NumPy raise a dozen kinds for what is broken
             raise InputError(f"{path}: not {what}") from error
-    if arrays is None:
-        raise InputError(f"{path}: more than {MAX_BYTES:,} bytes; expected {what}")
-    return arrays
 
 
-def unpacked(file: BinaryIO, names: Sequence[str]) -> dict[str, "np.ndarray[Any, Any]"] | None:
-    """Return those of the arrays `names` that the archive in `file` has; None for too many bytes.
+def unpacked(file: BinaryIO, names: Sequence[str]) -> dict[str, "np.ndarray[Any, Any]"]:
+    """Return those of the arrays `names` that the archive in `file` has.
 
-    Raises an exception of any kind for anything else.
+    Raises `InputError` for too many bytes, and an exception of any kind for anything else.
     """
     arrays, left = {}, MAX_BYTES
     _check_directory(file)
@@ -59,7 +58,7 @@ def unpacked(file: BinaryIO, names: Sequence[str]) -> dict[str, "np.ndarray[Any,
         for name in {f"{each}.npy" for each in names}.intersection(archive.namelist()):
             left -= archive.getinfo(name).file_size  # no more is unpacked of it
             if left < 0:
-                return None
+                raise InputError(f"more than {MAX_BYTES:,} bytes")
             with archive.open(name) as member:
                 array = np.lib.format.read_array(member, allow_pickle=False)
                 if array.dtype.kind == "U":  # NumPy does not look at its characters

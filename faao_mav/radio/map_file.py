@@ -90,7 +90,7 @@ def map_of_word(word: str, origin: tuple[float, float, float] | None = None) -> 
     """
     try:
         content = base64.b64decode(word[len(WORD) :], validate=True)
-        arrays = unpacked(io.BytesIO(content), _KEYS) or {}
+        arrays = unpacked(io.BytesIO(content), _KEYS)
     except Exception as error:  # as of an archive
         raise InputError("not the numbers of a map; expected the name of a file") from error
     read = _checked(arrays, "the map")

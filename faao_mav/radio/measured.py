@@ -41,7 +41,7 @@ _PLACES, _LEVELS = tuple(_WORDS)[:4], tuple(_WORDS)[4:]
 
 _DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0}
 _UNITS: Mapping[str, Mapping[str, float]] = {
-    "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6},
+    "time": {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6},
     "latitude": _DEGREES,
     "longitude": _DEGREES,
     "altitude": {"m": 1.0, "meters": 1.0, "metres": 1.0, "ft": 0.3048, "feet": 0.3048},
@@ -195,13 +195,12 @@ def _columns(
         del columns[name]
     for name in columns:
         known = _UNITS[name]
-        if unit_of[name] not in known and not (name == "time" and not unit_of[name]):
+        if unit_of[name] not in known:
             had = f"unit {unit_of[name]!r}" if unit_of[name] else "no unit"
             raise InputError(
                 f"{path}: line 1: {header[columns[name]]!r} has {had}; name it in the header or "
                 f"give --unit {name}=UNIT, one of {', '.join(filter(None, known))}"
             )
-        unit_of[name] = unit_of[name] or "s" if name == "time" else unit_of[name]
     return columns, unit_of
 
 
