@@ -1,4 +1,4 @@
-"""Names for the array types that signatures use; shapes stand in the docstrings."""
+"""Names for the array types that signatures use, and packed symmetric matrices of two by two."""
 
 from typing import TypeAlias
 
@@ -10,3 +10,8 @@ Complex: TypeAlias = NDArray[np.complex128]
 Integers: TypeAlias = NDArray[np.int_]
 Flags: TypeAlias = NDArray[np.bool_]
 RealOrComplex: TypeAlias = Real | Complex
+
+
+def products(a: Real, b: Real) -> Real:
+    """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ...), for a, b (2, ...)."""
+    return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])

@@ -21,7 +21,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Real, products
 
 GRAVITY = 9.80665
 """Standard gravity, m/s^2."""
@@ -140,7 +140,7 @@ class RotaryWing:
         first -= self.induced * per_square * inflow / (2 * root)
         second = 0.75 * self.parasite / np.maximum(speed, _STILL)
         second += self.induced * per_square**2 * inflow * (1 / root**2 + 2 * r / root**3) / 4
-        by_vv = 4 * second * _packed(v, v)
+        by_vv = 4 * second * products(v, v)
         by_vv[::2] += 2 * first
         none = np.zeros((2, *v.shape))
         return PowerPartials(self.level(speed), 2 * first * v, 0 * v, by_vv, 0 * by_vv, none)
@@ -197,11 +197,11 @@ class FixedWing:
         by_v = along * v + 2 * bank * across * by_turn + self.mass * share * a
         by_a = 2 * bank * across * turned + self.mass * share * v
         outward = 3 * self.c1 / speed + 3 * self.c2 / speed**5 + 15 * bank * across**2 / speed**4
-        by_vv = outward * _packed(v, v) + 2 * bank * _packed(by_turn, by_turn)
-        by_vv -= 12 * bank * across / speed**2 * _packed(v, by_turn)
-        by_vv += self.mass * curved * _packed(a, a)
+        by_vv = outward * products(v, v) + 2 * bank * products(by_turn, by_turn)
+        by_vv -= 12 * bank * across / speed**2 * products(v, by_turn)
+        by_vv += self.mass * curved * products(a, a)
         by_vv[::2] += along
-        by_aa = 2 * bank * _packed(turned, turned) + self.mass * curved * _packed(v, v)
+        by_aa = 2 * bank * products(turned, turned) + self.mass * curved * products(v, v)
         outer = by_turn - 3 * across / speed**2 * v
         by_va = 2 * bank * outer[:, None] * turned + self.mass * curved * a[:, None] * v
         by_va[0, 0] += self.mass * share
@@ -218,11 +218,6 @@ class FixedWing:
 
 PowerModel: TypeAlias = RotaryWing | FixedWing
 """What a flight takes, W."""
-
-
-def _packed(x: Real, y: Real) -> Real:
-    """Return the symmetric part of x y^T as xx, xy, yy, (3, ...)."""
-    return np.stack([x[0] * y[0], (x[0] * y[1] + x[1] * y[0]) / 2, x[1] * y[1]])
 
 
 def _least(speeds: Real, powers: Real) -> tuple[float, float]:

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Integers, Real
+from faao_mav.arrays import Integers, Real, products
 from faao_mav.radio.gain_map import Grid
 from faao_mav.radio.spline import Spline
 
@@ -25,6 +25,10 @@ PER_DB = float(np.log(10.0) / 10.0)
 
 _STEP = 1e-3
 """Step of ln d² in central differences: second derivatives of logarithms err by some 1e-6."""
+
+_REAL = 1e-6
+"""The imaginary part, in its size, up to which a root is real: a double root splits by rounding. A
+distance too many does no harm."""
 
 _SAMPLES = 500
 """Distances at which it is looked where a law turns that does not tell it. Chosen."""
@@ -154,16 +158,6 @@ class PathGain(GainFunction):
         for k in range(len(self._terms), 0, -1):
             total = (total + (-k / 2) ** order * self._terms[k - 1]) * s
         return total
-
-
-_REAL = 1e-6
-"""The imaginary part, in its size, up to which a root is real: a double root splits by rounding. A
-distance too many does no harm."""
-
-
-def products(a: Real, b: Real) -> Real:
-    """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ...), for a, b (2, ...)."""
-    return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,9 +34,8 @@ from typing import Protocol
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Complex, Real, products
 from faao_mav.optimizer.problem import Link
-from faao_mav.radio.gain import products
 
 
 @dataclass(frozen=True, slots=True, eq=False)
