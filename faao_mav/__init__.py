@@ -81,11 +81,11 @@ if TYPE_CHECKING:
     from faao_mav.study import parse_vary as parse_vary
     from faao_mav.study import run_study as run_study
     from faao_mav.study import study_figure as study_figure
+    from faao_mav.validate import Check as Check
     from faao_mav.validate import Finding as Finding
     from faao_mav.validate import Limits as Limits
     from faao_mav.validate import LinkCheck as LinkCheck
-    from faao_mav.validate.check import Check as Check
-    from faao_mav.validate.check import check as check
+    from faao_mav.validate import check as check
     from faao_mav.wire import download as download
     from faao_mav.wire import upload as upload
     from faao_mav.workflow import Result as Result
@@ -118,8 +118,7 @@ _HOMES = {
     "report.style": "save_figure",
     "schedule": "Conversion convert",
     "study": "StudyRow as_array make_cases parse_vary run_study study_figure",
-    "validate": "Finding Limits LinkCheck",
-    "validate.check": "Check check",
+    "validate": "Check Finding Limits LinkCheck check",
     "wire": "download upload",
     "workflow": "Result plan_mission",
 }

@@ -37,8 +37,7 @@ from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.validate import Finding, Level, Limits
-from faao_mav.validate.check import Check, check
+from faao_mav.validate import Check, Finding, Level, Limits, check
 from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing
 

@@ -9,7 +9,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.conversion import Conversion, convert
 from faao_mav.schedule.prediction import price_flight
-from faao_mav.validate.check import Check, check
+from faao_mav.validate import Check, check
 from faao_mav.workflow import plan_mission
 
 SHORT: dict[str, Any] = {

@@ -9,7 +9,7 @@ from faao_mav.app.document import Document, Path
 from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.report.summary import result_lines
 from faao_mav.validate import Finding
-from faao_mav.validate.words import by_rule, message_of
+from faao_mav.validate.rule import by_rule, message_of
 from faao_mav.workflow import Result
 
 

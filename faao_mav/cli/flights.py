@@ -77,7 +77,7 @@ def fly(
     from faao_mav.fly.telling import HEADER, Radios, Telling, as_text
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.summary import joined
-    from faao_mav.validate.check import predicted
+    from faao_mav.validate import predicted
 
     begun = False
 

@@ -32,8 +32,7 @@ from faao_mav.errors import InputError, printable
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
-    from faao_mav.validate import Level, Rule
-    from faao_mav.validate.check import Check
+    from faao_mav.validate import Check, Level, Rule
 
 
 @exit_status()
@@ -80,8 +79,7 @@ def validate(
     or a file that cannot be read.
     """
     from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.validate import RULES, Level, Limits
-    from faao_mav.validate.check import check
+    from faao_mav.validate import RULES, Level, Limits, check
 
     if rules:
         show(lambda: _rules_as_dict(RULES), lambda: _rule_lines(RULES), as_json=as_json)
@@ -190,7 +188,7 @@ def _lines(source: str, chosen_by: str, check: "Check") -> Iterator[str]:
     """Yield what was found: one line a rule, and one of what to do."""
     from faao_mav.report.summary import check_lines
     from faao_mav.validate import Level
-    from faao_mav.validate.words import by_rule, count_of, said_of
+    from faao_mav.validate.rule import by_rule, count_of, said_of
 
     vehicle = check.vehicle
     yield (

@@ -155,7 +155,7 @@ def _checked_plan(
 def _sound(result: "Result") -> bool:
     """Say the errors that validation found, and whether there are none."""
     from faao_mav.validate import Level
-    from faao_mav.validate.words import by_rule, line_of
+    from faao_mav.validate.rule import by_rule, line_of
 
     errors = [finding for finding in result.findings if finding.level is Level.ERROR]
     for group in by_rule(errors):

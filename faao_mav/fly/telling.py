@@ -27,8 +27,7 @@ from faao_mav.validate.flown import (
     plan_start,
     standing,
 )
-from faao_mav.validate.rule import Finding, Level
-from faao_mav.validate.words import by_rule, count_of, line_of
+from faao_mav.validate.rule import Finding, Level, by_rule, count_of, line_of
 from faao_mav.vector import lengths
 
 _NEAR = 20.0

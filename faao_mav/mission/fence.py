@@ -1,9 +1,10 @@
 """Geofences and rally points: what travels beside a mission."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -80,18 +81,32 @@ class Polygon:
 
 
 @dataclass(frozen=True, slots=True)
-class RallyPoint:
-    """A place to return to instead of home: degrees, metres above home (NaN: not known).
+class Point:
+    """A place: WGS84 degrees, and an altitude, m, NaN where it is not known.
 
-    Raises `InputError` for coordinates that are no place on Earth.
+    Raises `InputError` for coordinates that are no place on Earth, and says what it is `called`.
     """
 
     latitude: float
     longitude: float
     altitude: float
+    called: ClassVar[str]
 
     def __post_init__(self) -> None:
-        check_place((self.latitude, self.longitude), "rally point", self.altitude)
+        check_place((self.latitude, self.longitude), self.called, self.altitude)
+
+    @property
+    def on_ground(self) -> tuple[float, float, float]:
+        """Latitude, longitude and altitude, 0 where that is not known."""
+        altitude = 0.0 if math.isnan(self.altitude) else self.altitude
+        return self.latitude, self.longitude, altitude
+
+
+@dataclass(frozen=True, slots=True)
+class RallyPoint(Point):
+    """A place to return to instead of home: its altitude counts from home."""
+
+    called = "rally point"
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,23 +127,32 @@ class Fence:
     notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
-        for shape, areas in (("polygons", self.polygons), ("circles", self.circles)):
-            for inclusion, kind in ((True, "inclusion"), (False, "exclusion")):
-                count = sum(area.inclusion is inclusion for area in areas)
-                if count > _MAX_AREAS:
-                    raise InputError(
-                        f"fence: {count:,} {kind} {shape}; at most {_MAX_AREAS} are accepted, as "
-                        "many as an autopilot tells apart"
-                    )
-        check_outlines((*self.polygons, *self.circles))
+        for kind, count in Counter(map(kind_of, self.areas)).items():
+            if count > _MAX_AREAS:
+                raise InputError(
+                    f"fence: {count:,} {kind}s; at most {_MAX_AREAS} are accepted, as many as an "
+                    "autopilot tells apart"
+                )
+        check_outlines(self.areas)
+
+    @property
+    def areas(self) -> tuple[Polygon | Circle, ...]:
+        """The polygons, then the circles."""
+        return (*self.polygons, *self.circles)
 
     def __bool__(self) -> bool:
-        return bool(self.polygons or self.circles)
+        return bool(self.areas)
 
     @property
     def place(self) -> LatLon:
         """A place of the fence, to count metres from; raises IndexError without areas."""
         return self.polygons[0].vertices[0] if self.polygons else self.circles[0].center
+
+
+def kind_of(area: Polygon | Circle) -> str:
+    """Return which of the four kinds of areas it is, as in "exclusion circle"."""
+    shape = "polygon" if isinstance(area, Polygon) else "circle"
+    return f"{'inclusion' if area.inclusion else 'exclusion'} {shape}"
 
 
 def check_outlines(areas: Sequence[Polygon | Circle]) -> None:

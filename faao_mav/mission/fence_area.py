@@ -1,10 +1,10 @@
 """The fence in the plane: its areas, and where they let the aircraft be."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -13,8 +13,8 @@ from shapely.geometry.base import BaseGeometry
 from faao_mav.arrays import Flags, Real
 from faao_mav.errors import quote
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.fence import Circle, Fence, Polygon
-from faao_mav.mission.shortest_way import shortest_way
+from faao_mav.mission.fence import Circle, Fence, Polygon, kind_of
+from faao_mav.mission.polygons import enclosed, polygonal, shortest_way
 from faao_mav.vector import Vector
 
 _SEGMENTS = 64
@@ -66,34 +66,33 @@ def _rings(shape: BaseGeometry) -> list[Real]:
 
 
 def areas_of(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
-    """Return the parts of `fence` in `frame`: polygons, then circles."""
+    """Return the parts of `fence` in `frame`: polygons, then circles.
+
+    Each is called by its name, or by its number among those of its kind.
+    """
+    unnamed = Counter(kind_of(zone) for zone in fence.areas if not zone.name)
+    seen: Counter[str] = Counter()
     areas = []
-    for name, polygon in zip(_names(fence.polygons, "polygon"), fence.polygons, strict=True):
-        outline = shapely.Polygon(frame.to_local(*np.transpose(polygon.vertices)))
-        crosses = not shapely.is_valid(outline)
-        shape = _enclosed(outline) if crosses else outline
-        areas.append(Area(name, polygon.inclusion, shape, crosses))
-    for name, circle in zip(_names(fence.circles, "circle"), fence.circles, strict=True):
-        east, north = map(float, frame.to_local(*circle.center))
-        radius = circle.radius * (1.0 if circle.inclusion else OUTSIDE)
-        shape = shapely.Point(east, north).buffer(radius, quad_segs=_SEGMENTS)
-        disc = (east, north, circle.radius)
-        areas.append(Area(name, circle.inclusion, shape, disc=disc))
+    for zone in fence.areas:
+        name = kind = kind_of(zone)
+        if zone.name:
+            name = f"{kind.partition(' ')[0]} {quote(zone.name)}"
+        elif unnamed[kind] > 1:
+            seen[kind] += 1
+            name = f"{kind} {seen[kind]}"
+        areas.append(_area(name, zone, frame))
     return tuple(areas)
 
 
-def _names(zones: Sequence[Polygon | Circle], shape: str) -> Iterator[str]:
-    """Yield what to call each of `zones`: by its name, or by its number among those of its kind."""
-    unnamed = [zone.inclusion for zone in zones if not zone.name]
-    seen = {True: 0, False: 0}
-    for zone in zones:
-        kind = "inclusion" if zone.inclusion else "exclusion"
-        if zone.name:
-            yield f"{kind} {quote(zone.name)}"
-            continue
-        seen[zone.inclusion] += 1
-        alone = unnamed.count(zone.inclusion) == 1
-        yield f"{kind} {shape}" if alone else f"{kind} {shape} {seen[zone.inclusion]}"
+def _area(name: str, zone: Polygon | Circle, frame: LocalFrame) -> Area:
+    if isinstance(zone, Polygon):
+        outline = shapely.Polygon(frame.to_local(*np.transpose(zone.vertices)))
+        crosses = not shapely.is_valid(outline)
+        return Area(name, zone.inclusion, enclosed(outline) if crosses else outline, crosses)
+    east, north = map(float, frame.to_local(*zone.center))
+    radius = zone.radius * (1.0 if zone.inclusion else OUTSIDE)
+    shape = shapely.Point(east, north).buffer(radius, quad_segs=_SEGMENTS)
+    return Area(name, zone.inclusion, shape, disc=(east, north, zone.radius))
 
 
 def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> BaseGeometry | None:
@@ -105,30 +104,7 @@ def free_area(areas: Sequence[Area], *, any_inclusion: bool) -> BaseGeometry | N
     if not shapes:
         return None
     joined = shapely.union_all(shapes) if any_inclusion else shapely.intersection_all(shapes)
-    return _polygonal(joined)
-
-
-def _enclosed(outline: shapely.Polygon) -> BaseGeometry:
-    """Return what an odd number of turns of `outline` encloses.
-
-    Its edges cut the plane into faces, each enclosed or not as one of its points is. For 100
-    corners that cross everywhere `shapely.make_valid` takes 50 times as long.
-    """
-    edges = shapely.union_all(outline.exterior)
-    faces = shapely.get_parts(shapely.polygonize([edges]))
-    x, y = shapely.get_coordinates(shapely.point_on_surface(faces)).T
-    odd = np.zeros(len(faces), dtype=bool)
-    for (x0, y0), (x1, y1) in pairwise(outline.exterior.coords):
-        if y0 != y1:  # does the way east from (x, y) cross this edge?
-            odd ^= ((y0 > y) != (y1 > y)) & (x < x0 + (x1 - x0) * ((y - y0) / (y1 - y0)))
-    return shapely.coverage_union_all(faces[odd])
-
-
-def _polygonal(shape: BaseGeometry) -> BaseGeometry:
-    """Return the part of `shape` that has an area."""
-    parts = shapely.get_parts(shapely.get_parts(shape))
-    flat = [part for part in parts if part.geom_type == "Polygon"]
-    return shapely.union_all(flat) if flat else shapely.Polygon()
+    return polygonal(joined)
 
 
 @dataclass(frozen=True)
@@ -155,7 +131,7 @@ class FreeArea:
         if free is None:
             free = shapely.box(-FARTHEST, -FARTHEST, FARTHEST, FARTHEST)
         out = shapely.union_all([area.shape for area in areas if not area.inclusion])
-        return cls(_polygonal(free - out))
+        return cls(polygonal(free - out))
 
     @cached_property
     def _prepared(self) -> BaseGeometry:
@@ -169,13 +145,13 @@ class FreeArea:
 
     def inside(self, margin: float) -> "FreeArea":
         """Return the places at least `margin` metres from the edge, but for 0.1 mm a metre."""
-        return FreeArea(_polygonal(self.shape.buffer(-margin * OUTSIDE, quad_segs=_SEGMENTS)))
+        return FreeArea(polygonal(self.shape.buffer(-margin * OUTSIDE, quad_segs=_SEGMENTS)))
 
     def within(self, low: Vector, high: Vector) -> "FreeArea":
         """Return what lies in the rectangle from the corner `low` to `high`, m."""
         if low[0] >= high[0] or low[1] >= high[1]:
             return FreeArea(shapely.Polygon())
-        return FreeArea(_polygonal(self.shape & shapely.box(low[0], low[1], high[0], high[1])))
+        return FreeArea(polygonal(self.shape & shapely.box(low[0], low[1], high[0], high[1])))
 
     def edges(self) -> list[Real]:
         """Return the closed rings (k, 2), m, that bound the area; of the plane's square none."""
@@ -227,7 +203,7 @@ class FreeArea:
             return None
         end = shapely.get_coordinates(first[0])[-1]
         bar = shapely.LineString([corner - _INTO * outward, end]).buffer(_BAR)
-        return FreeArea(_polygonal(self.shape - bar))
+        return FreeArea(polygonal(self.shape - bar))
 
     def shortest_way(self, start: Real, end: Real) -> Real | None:
         """Return the corners (k, 2) of the shortest way from `start` to `end`, both (2,).
@@ -254,7 +230,7 @@ class FreeArea:
 
 def _way(shape: BaseGeometry, start: Real, end: Real) -> Real | None:
     """Return the shortest way from `start` to `end` in the part of `shape` that has an area."""
-    flat = _polygonal(shape)
+    flat = polygonal(shape)
     shapely.prepare(flat)
     return shortest_way(flat, start, end)
 

@@ -1,4 +1,4 @@
-"""A mission as data: items and their jumps, home, fence, rally points; as rows for the wire."""
+"""A mission as data: items and their jumps, home, fence, rally points; and as items to send."""
 
 import math
 from collections.abc import Sequence
@@ -6,8 +6,16 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from faao_mav.errors import InputError
-from faao_mav.mission.command import FLOWN_TO, Command, Frame
-from faao_mav.mission.fence import Fence, LatLon, RallyPoint, check_place
+from faao_mav.mission.command import (
+    CIRCLE,
+    FENCE_RETURN_POINT,
+    FLOWN_TO,
+    POLYGON,
+    RALLY_POINT,
+    Command,
+    Frame,
+)
+from faao_mav.mission.fence import Circle, Fence, LatLon, Point, Polygon, RallyPoint
 
 Params: TypeAlias = tuple[float, float, float, float]
 """param1 to param4 of an item."""
@@ -22,19 +30,10 @@ _MAX_RALLY = 255
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
-    """Where relative altitudes count from: WGS84 degrees, metres above mean sea level.
+class Home(Point):
+    """Where relative altitudes count from: its own counts from mean sea level."""
 
-    The altitude is NaN where it is not known. Raises `InputError` for coordinates that are no place
-    on Earth.
-    """
-
-    latitude: float
-    longitude: float
-    altitude: float
-
-    def __post_init__(self) -> None:
-        check_place((self.latitude, self.longitude), "home", self.altitude)
+    called = "home"
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,11 +132,8 @@ def check_count(count: int, what: str, most: int) -> None:
 
 def home_item(home: Home | None) -> MissionItem:
     """Return the row 0 that stands for `home`: zeros for none, and for an unknown altitude."""
-    known = home or Home(0.0, 0.0, 0.0)
-    altitude = 0.0 if math.isnan(known.altitude) else known.altitude
-    return MissionItem(
-        Command.NAV_WAYPOINT, Frame.GLOBAL, x=known.latitude, y=known.longitude, z=altitude
-    )
+    place = (0.0, 0.0, 0.0) if home is None else home.on_ground
+    return _placed(Command.NAV_WAYPOINT, 0.0, *place)
 
 
 def as_sent(mission: Mission, *, home_row: bool) -> tuple[MissionItem, ...]:
@@ -198,3 +194,66 @@ def jump_target(items: Sequence[MissionItem], index: int) -> int | None:
         return int(number) - 1 if 1 <= int(number) <= len(items) else None
     tags = (k for k, each in enumerate(items) if each.command == Command.JUMP_TAG)
     return next((k for k in tags if items[k].params[0] == number), None)
+
+
+def fence_items(fence: Fence) -> tuple[MissionItem, ...]:
+    """Return `fence` as items: return point, polygons vertex by vertex, circles."""
+    items = []
+    if fence.breach_return is not None:
+        place, frame = fence.breach_return.on_ground, Frame.GLOBAL_RELATIVE_ALT
+        items.append(_placed(FENCE_RETURN_POINT, 0.0, *place, frame=frame))
+    for polygon in fence.polygons:
+        command, count = POLYGON[polygon.inclusion], float(len(polygon.vertices))
+        items += [_placed(command, count, *vertex) for vertex in polygon.vertices]
+    for circle in fence.circles:
+        items.append(_placed(CIRCLE[circle.inclusion], circle.radius, *circle.center))
+    return tuple(items)
+
+
+def rally_items(points: Sequence[RallyPoint]) -> tuple[MissionItem, ...]:
+    """Return rally points as items; raise `InputError` for one whose altitude is not known."""
+    for number, point in enumerate(points, start=1):
+        if math.isnan(point.altitude):
+            raise InputError(
+                f"rally point {number}: its altitude is not set, and 0 m would be the ground; "
+                "give metres above home"
+            )
+    frame = Frame.GLOBAL_RELATIVE_ALT
+    return tuple(_placed(RALLY_POINT, 0.0, *point.on_ground, frame=frame) for point in points)
+
+
+def fence_of(items: Sequence[MissionItem]) -> Fence:
+    """Return the fence that `items` make: the reverse of `fence_items`.
+
+    Raises `InputError` for other items, and for a polygon of fewer vertices than its items say.
+    """
+    polygons, circles, breach_return = [], [], None
+    vertices: list[LatLon] = []
+    for number, item in enumerate(items):
+        if item.command in POLYGON.values():
+            vertices.append((item.x, item.y))
+            if len(vertices) == item.params[0]:
+                polygons.append(Polygon(tuple(vertices), item.command == POLYGON[True]))
+                vertices = []
+            continue
+        if vertices:
+            break
+        if item.command in CIRCLE.values():
+            inclusion = item.command == CIRCLE[True]
+            circles.append(Circle((item.x, item.y), item.params[0], inclusion))
+        elif item.command == FENCE_RETURN_POINT:
+            breach_return = RallyPoint(item.x, item.y, item.z)
+        else:
+            raise InputError(f"fence item {number}: command {item.command}; expected 5000 to 5004")
+    if vertices:
+        raise InputError(
+            f"fence: a polygon stops after {len(vertices)} of its vertices; expected as many as "
+            "its items say"
+        )
+    return Fence(tuple(polygons), tuple(circles), breach_return)
+
+
+def _placed(
+    command: int, param1: float, x: float, y: float, z: float = 0.0, frame: Frame = Frame.GLOBAL
+) -> MissionItem:
+    return MissionItem(command, frame, (param1, 0.0, 0.0, 0.0), x, y, z)

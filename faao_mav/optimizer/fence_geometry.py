@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.mission.convex_pieces import convex_pieces
 from faao_mav.mission.fence_area import OUTSIDE, free_area
+from faao_mav.mission.polygons import convex_pieces
 from faao_mav.optimizer.interior.separation import ConvexObstacles
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.plan import Plan

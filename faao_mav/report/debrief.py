@@ -17,7 +17,7 @@ from faao_mav.radio.measured import SIK_STEP
 from faao_mav.report.summary import Line, beside
 from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
-from faao_mav.validate.words import counted
+from faao_mav.validate.rule import counted
 from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
 _SAME = 1e-5

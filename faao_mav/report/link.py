@@ -13,7 +13,7 @@ from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.terrain import free_space_db
 from faao_mav.report.style import INK, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.report.summary import Line
-from faao_mav.validate.words import counted
+from faao_mav.validate.rule import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

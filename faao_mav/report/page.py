@@ -11,9 +11,8 @@ from faao_mav.plan.yaml_text import shown
 from faao_mav.report.debrief import FromLog
 from faao_mav.report.style import inline_svg
 from faao_mav.report.summary import Line, check_lines, result_lines
-from faao_mav.validate import Finding
-from faao_mav.validate.check import Check
-from faao_mav.validate.words import by_rule, said_of
+from faao_mav.validate import Check, Finding
+from faao_mav.validate.rule import by_rule, said_of
 from faao_mav.workflow import Result
 
 if TYPE_CHECKING:

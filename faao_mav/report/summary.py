@@ -13,10 +13,9 @@ from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
 from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.validate import Level
-from faao_mav.validate.check import Check
+from faao_mav.validate import Check, Level
 from faao_mav.validate.demands import LATE_START
-from faao_mav.validate.words import by_rule, count_of, counted, line_of
+from faao_mav.validate.rule import by_rule, count_of, counted, line_of
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result
 

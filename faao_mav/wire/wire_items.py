@@ -13,8 +13,15 @@ from faao_mav.autopilot import VehicleType
 from faao_mav.errors import InputError
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Frame
 from faao_mav.mission.fence import RallyPoint, check_place
-from faao_mav.mission.fence_items import fence_items, fence_of, rally_items
-from faao_mav.mission.item import Mission, MissionItem, as_received, as_sent
+from faao_mav.mission.item import (
+    Mission,
+    MissionItem,
+    as_received,
+    as_sent,
+    fence_items,
+    fence_of,
+    rally_items,
+)
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
 

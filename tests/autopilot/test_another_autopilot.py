@@ -35,8 +35,7 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
 from faao_mav.schedule import convert
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.validate import Limits
-from faao_mav.validate.check import check
+from faao_mav.validate import Limits, check
 from faao_mav.workflow import plan_mission
 
 TOY = AutopilotFamily(

@@ -6,8 +6,8 @@ import pytest
 import shapely
 from hypothesis import given
 
-from faao_mav.mission.convex_pieces import convex_pieces
 from faao_mav.mission.fence_area import FreeArea
+from faao_mav.mission.polygons import convex_pieces
 
 coordinates = st.floats(0, 100, allow_subnormal=False)
 places = st.tuples(coordinates, coordinates)

@@ -14,7 +14,7 @@ from reported import HOSTILE, conversion, flown
 from faao_mav.errors import InfeasibleError
 from faao_mav.report import summary
 from faao_mav.report.page import render_report
-from faao_mav.validate.check import Check
+from faao_mav.validate import Check
 from faao_mav.workflow import Result
 
 VOID = {"meta", "br", "link", "img", "input", "hr"}

@@ -20,8 +20,7 @@ from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import read_mission, read_mission_file
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.sim import behaviour_of
-from faao_mav.validate import Finding, Level, ValidationContext, validate
-from faao_mav.validate.check import check
+from faao_mav.validate import Finding, Level, ValidationContext, check, validate
 
 DATA = Path(__file__).parent.parent / "data"
 CORPUS = DATA / "validate"

@@ -7,7 +7,6 @@ from typing import TypeAlias, TypeVar
 
 from faao_mav.errors import InputError, MissionFileError
 from faao_mav.files import read_text, write_together
-from faao_mav.mission.fence_items import fence_items
 from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
 from faao_mav.mission.formats.kml import kml_losses, write_kml
 from faao_mav.mission.formats.mission_file import MissionFile as MissionFile
@@ -16,7 +15,7 @@ from faao_mav.mission.formats.qgc_plan import plan_losses, read_qgc_plan
 from faao_mav.mission.formats.qgc_plan import write_qgc_plan as write_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, wpl_losses, write_wpl_fence
 from faao_mav.mission.formats.wpl import write_wpl as write_wpl
-from faao_mav.mission.item import Mission
+from faao_mav.mission.item import Mission, fence_items
 
 Target: TypeAlias = PlanTarget | None
 Read = TypeVar("Read")

@@ -7,7 +7,7 @@ of a row in the file, row 0 being home: its index, where indexes count up. Sourc
 guide, "File formats".
 
 A fence is a file of its own, as Mission Planner saves it from its fence screen: the home row, then
-the rows of `faao_mav.mission.fence_items`. Mission Planner drops the first row of a fence that it
+the rows of `faao_mav.mission.item`. Mission Planner drops the first row of a fence that it
 loads (its pull request 2739), MAVProxy writes none.
 """
 
@@ -20,9 +20,17 @@ import numpy as np
 from faao_mav.errors import MissionFileError, quote
 from faao_mav.mission.command import ABOVE_HOME, CIRCLE, FENCE_RETURN_POINT, POLYGON, Command, Frame
 from faao_mav.mission.fence import Fence
-from faao_mav.mission.fence_items import fence_items, fence_of
 from faao_mav.mission.formats.mission_file import MissionFile, not_read, rally_left_out, zeros
-from faao_mav.mission.item import MAX_ITEMS, Home, Mission, MissionItem, check_count, home_item
+from faao_mav.mission.item import (
+    MAX_ITEMS,
+    Home,
+    Mission,
+    MissionItem,
+    check_count,
+    fence_items,
+    fence_of,
+    home_item,
+)
 
 HEADER = "QGC WPL 110"
 
