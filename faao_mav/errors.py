@@ -132,3 +132,12 @@ def shortened(text: str, most: int = _MAX_SHOWN) -> str:
     '12345...'
     """
     return text if len(text) <= most else text[: most - 3] + "..."
+
+
+def counted(number: int, noun: str) -> str:
+    """Return "1 area" or "2 areas".
+
+    >>> counted(1, "area"), counted(0, "area")
+    ('1 area', '0 areas')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -18,8 +18,13 @@ from faao_mav.autopilot.predict import predict
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.formats import fence_path, render_files
-from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
+from faao_mav.mission.formats import (
+    check_replaceable,
+    comment_for,
+    fence_path,
+    remove_outdated,
+    render_files,
+)
 from faao_mav.mission.formats.kml import write_kml
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.optimizer.pricing import (

@@ -139,10 +139,9 @@ def convert(
     """
     from faao_mav.autopilot import Vehicle, kind_by_number
     from faao_mav.autopilot.files import made_for, plan_target
-    from faao_mav.mission.formats import check_readable, check_suffix
+    from faao_mav.mission.formats import check_suffix
 
     check_known(autopilot, None)
-    check_readable(mission_file)
     check_suffix(out)
     check_outputs({"--out": out}, {"MISSION": mission_file})
     read = read_noted(mission_file)

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.autopilot.manners import FenceAction
+from faao_mav.errors import counted
 from faao_mav.fly.telemetry import Held, Telemetry
 from faao_mav.mission.item import Home, Mission
 from faao_mav.validate import Check, Limits, check, predicted
-from faao_mav.validate.rule import Finding, Level, Rule, counted, rows_of
+from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.speeds import beyond_lean
 from faao_mav.wire.parameters import number_in
 from faao_mav.wire.protocol import MissionType

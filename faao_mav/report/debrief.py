@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.errors import FaaoError
+from faao_mav.errors import FaaoError, counted
 from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.logs import read_log
 from faao_mav.optimizer.solution import Solution
@@ -17,7 +17,6 @@ from faao_mav.radio.measured import SIK_STEP
 from faao_mav.report.summary import Line, beside
 from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
-from faao_mav.validate.rule import counted
 from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
 _SAME = 1e-5

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from faao_mav.arrays import Real
+from faao_mav.errors import counted
 from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, seen
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.terrain import free_space_db
 from faao_mav.report.style import INK, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.report.summary import Line
-from faao_mav.validate.rule import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from faao_mav.errors import counted
 from faao_mav.optimizer.kinematics import kinematics
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
@@ -15,7 +16,7 @@ from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Check, Level
 from faao_mav.validate.demands import LATE_START
-from faao_mav.validate.rule import by_rule, count_of, counted, line_of
+from faao_mav.validate.rule import by_rule, count_of, line_of
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result
 

@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
+from faao_mav.errors import counted
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -176,12 +177,3 @@ def items_of(group: Sequence[Finding]) -> str:
     if len(shown) > _MAX_RUNS_SHOWN:
         shown[_MAX_RUNS_SHOWN:] = ["..."]
     return ", ".join(shown)
-
-
-def counted(number: int, noun: str) -> str:
-    """Return "1 area" or "2 areas".
-
-    >>> counted(1, "area"), counted(0, "area")
-    ('1 area', '0 areas')
-    """
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

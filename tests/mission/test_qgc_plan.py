@@ -32,22 +32,20 @@ def test_a_height_that_is_null_is_not_known() -> None:
 
 def test_the_form_that_qgroundcontrol_asks_for() -> None:
     frames = [0, 2, 3, 5, 6, 10, 11]
-    speed = MissionItem(178, 2, (1.0, 8.0, -1.0, 0.0))
-    mission = Mission((*(MissionItem(16, frame, z=7.0) for frame in frames), speed))
+    mission = Mission(tuple(MissionItem(16, frame, z=7.0) for frame in frames))
     plan = json.loads(write_qgc_plan(mission, PX4))
     assert (plan["fileType"], plan["version"]) == ("Plan", 1)
     assert (plan["geoFence"]["version"], plan["rallyPoints"]["version"]) == (2, 2)
     part = plan["mission"]
     assert (part["version"], part["firmwareType"], part["vehicleType"]) == (2, 12, 2)
     assert part["plannedHomePosition"] == [0, 0, 0]
-    assert [item["doJumpId"] for item in part["items"]] == list(range(1, len(frames) + 2))
+    assert [item["doJumpId"] for item in part["items"]] == list(range(1, len(frames) + 1))
     modes = [item.get("AltitudeMode") for item in part["items"]]
-    assert modes == [2, None, 1, 2, 1, 4, 4, None]
+    assert modes == [2, None, 1, 2, 1, 4, 4]
     shown = part["items"][0]
     assert (shown["Altitude"], shown["AMSLAltAboveTerrain"]) == (7.0, None)
     keys = ("cruiseSpeed", "hoverSpeed", "globalPlanAltitudeMode")
-    assert [part[key] for key in keys] == [8, 8, 0]
-    assert [json.loads(GOOD)["mission"][key] for key in keys] == [15, 5, 1]
+    assert [part[key] for key in keys] == [15, 5, 0]
     for target in (0.0, 3.0, 1.5, math.nan, -1.0):
         jump = MissionItem(177, 2, (target, 1.0, 0.0, 0.0))
         with pytest.raises(MissionFileError, match=r"x\.plan: item 2: DO_JUMP to .*, 1 to 2"):

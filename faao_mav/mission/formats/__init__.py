@@ -1,4 +1,9 @@
-"""Mission files, by the ending of their name."""
+"""Mission files, by the ending of their name, and the files beside them that belong to them.
+
+Whoever takes a mission takes the fence and the parameters beside it too. So those that a run of
+this program wrote say so in a comment, and go when the mission is another one; those of other
+origin are not touched.
+"""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -6,8 +11,7 @@ from pathlib import Path
 from typing import TypeAlias, TypeVar
 
 from faao_mav.errors import InputError, MissionFileError
-from faao_mav.files import read_text, write_together
-from faao_mav.mission.formats.beside import check_replaceable, comment_for, remove_outdated
+from faao_mav.files import check_writable, read_text, write_together
 from faao_mav.mission.formats.kml import kml_losses, write_kml
 from faao_mav.mission.formats.mission_file import MissionFile as MissionFile
 from faao_mav.mission.formats.mission_file import PlanTarget as PlanTarget
@@ -38,14 +42,12 @@ class Format:
     fence_beside: bool = False
 
 
-_WPL = Format(read_wpl, lambda mission, *_: write_wpl(mission), lambda m, _: wpl_losses(m), True)
+_WPL = Format(read_wpl, lambda mission, *_: write_wpl(mission), wpl_losses, True)
 _FORMATS = {
     ".waypoints": _WPL,
     ".txt": _WPL,
     ".plan": Format(read_qgc_plan, lambda mission, to, _: write_qgc_plan(mission, to), plan_losses),
-    ".kml": Format(
-        None, lambda mission, _, name: write_kml(mission, name), lambda m, _: kml_losses(m)
-    ),
+    ".kml": Format(None, lambda mission, _, name: write_kml(mission, name), kml_losses),
 }
 
 MAX_BYTES = 16_000_000
@@ -82,7 +84,13 @@ def read_mission_file(path: str | Path) -> MissionFile:
     not what it should be.
     """
     path = Path(path)
-    file, beside = _read(path, "a mission", check_readable(path)), fence_path(path)
+    read = check_suffix(path).read
+    if read is None:
+        raise MissionFileError(
+            f"{path}: KML is written for drawing and lacks commands and speeds; "
+            "give the .waypoints or .plan file of the mission"
+        )
+    file, beside = _read(path, "a mission", read), fence_path(path)
     mission, warnings = file.mission, [f"{path}: {line}" for line in file.warnings]
     if beside is not None and beside.is_file():
         mission = replace(mission, fence=_read(beside, "a fence", read_wpl_fence))
@@ -172,15 +180,38 @@ def check_suffix(path: Path) -> Format:
     return _FORMATS[path.suffix.lower()]
 
 
-def check_readable(path: Path) -> Callable[[str], MissionFile]:
-    """Return the reader for a file by the ending of its name.
+def comment_for(mission: Path) -> str:
+    """Return what a file that is written beside `mission` says in its first comment."""
+    return f"for {mission.name}"
 
-    Raises `MissionFileError` unless it is that of a format that can be read.
+
+def check_replaceable(beside: Path, what: str) -> None:
+    """Raise `InputError` where `what`, to be written to `beside`, would replace a user's own file.
+
+    Likewise for a file that cannot be written. To be asked before the work.
     """
-    read = check_suffix(path).read
-    if read is None:
-        raise MissionFileError(
-            f"{path}: KML is written for drawing and lacks commands and speeds; "
-            "give the .waypoints or .plan file of the mission"
+    check_writable(beside)
+    if beside.exists() and not _is_of_a_run(beside):
+        raise InputError(
+            f"{beside}: {what} to go there, but it is not of an earlier run; rename it, or give "
+            "the mission another name"
         )
-    return read
+
+
+def remove_outdated(beside: Path) -> None:
+    """Remove `beside` if an earlier run wrote it: it belongs to a mission that is gone."""
+    try:
+        if _is_of_a_run(beside):
+            beside.unlink()
+    except OSError as error:
+        raise InputError(
+            f"{beside}: is of an earlier mission and cannot be removed: {error.strerror}"
+        ) from None
+
+
+def _is_of_a_run(beside: Path) -> bool:
+    """Tell by the first two lines whether this program wrote `beside` beside a mission."""
+    if not beside.is_file():
+        return False
+    with beside.open("rb") as file:
+        return any(file.readline(200).startswith(b"# for ") for _ in range(2))

@@ -26,9 +26,6 @@ from faao_mav.mission.formats.json_value import Json
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
-_NAMES = ("name", "title", "label", "id")
-"""Properties in GeoJSON, in any case, of which the first one given names a feature."""
-
 _NOT_DENIED = r"(?<!\bnot )(?<!\bnon )(?<!\bun )\b"
 
 _OUT = re.compile(
@@ -105,23 +102,19 @@ def _of_geojson(
     value: Json, properties: Mapping[str, object], around: tuple[str, ...]
 ) -> Iterator[DrawnZone]:
     match value["type"].value:
-        case "FeatureCollection":
-            name = value.value.get("name")
+        case "FeatureCollection" | "GeometryCollection" as kind:
+            name = value.members.get("name")
             around += (name,) if isinstance(name, str) else ()
-            for each in value["features"].each():
-                yield from _of_geojson(each, {}, around)
+            for each in value["features" if kind == "FeatureCollection" else "geometries"].each():
+                yield from _of_geojson(each, properties, around)
         case "Feature":
-            told, geometry = value.value.get("properties"), value.get("geometry")
+            told, geometry = value.members.get("properties"), value.get("geometry")
             if geometry is not None:
                 yield from _of_geojson(geometry, told if isinstance(told, dict) else {}, around)
-        case "GeometryCollection":
-            for each in value["geometries"].each():
-                yield from _of_geojson(each, properties, around)
         case "Polygon" | "MultiPolygon" as kind:
             coordinates = value["coordinates"].value
-            folded = {key.casefold(): told for key, told in properties.items()}
-            names = (folded[key] for key in _NAMES if folded.get(key) not in (None, ""))
             parts = coordinates if kind == "MultiPolygon" else [coordinates]
+            names = (told for key, told in properties.items() if key.casefold() == "name" and told)
             place, name = value.place or "the polygon", str(next(names, ""))
             yield DrawnZone(place, name, properties, around, parts)
         case "Point" | "MultiPoint" | "LineString" | "MultiLineString":

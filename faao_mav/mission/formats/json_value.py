@@ -49,9 +49,15 @@ class Json:
             raise self.wrong(expected)
         return self.value
 
+    @property
+    def members(self) -> dict[str, Any]:
+        """The values of the object by their keys."""
+        found: dict[str, Any] = self.checked(isinstance(self.value, dict), "an object")
+        return found
+
     def get(self, key: str) -> "Json | None":
         """Return what the object has under `key`, None for nothing or null."""
-        value = self.checked(isinstance(self.value, dict), "an object").get(key)
+        value = self.members.get(key)
         return None if value is None else Json(value, *self.steps, key)
 
     def __getitem__(self, key: str) -> "Json":

@@ -12,12 +12,13 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Command, Frame
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Frame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import areas_of
-from faao_mav.mission.formats.mission_file import not_read, rally_left_out
+from faao_mav.mission.formats.mission_file import left_out
 from faao_mav.mission.item import Mission, MissionItem
 
 Spot: TypeAlias = tuple[float, float, float]
@@ -61,36 +62,22 @@ def write_kml(
     mode = "absolute" if above_sea else "relativeToGround"
     parts = [_tag("name", _text(name)), _STYLES]
     if len(waypoints) > 1:
-        spots = (spot for _, _, spot in waypoints)
-        parts.append(_placemark("Route", _shape("LineString", mode, *spots), "route"))
-    points = (
-        _placemark(str(number), _tag("description", _description(item)) + _shape("Point", mode, at))
-        for number, item, at in waypoints
-    )
-    for folder, inside in (
-        ("Waypoints", "".join(points)),
-        ("Fence", "".join(_areas(mission.fence))),
-    ):
-        parts += [_tag("Folder", _tag("name", folder) + inside)] if inside else []
+        route = _shape("LineString", mode, *(spot for *_, spot in waypoints))
+        parts.append(_placemark("Route", _style("route"), route))
+    points = [_placemark(str(number), _shape("Point", mode, spot)) for number, _, spot in waypoints]
+    for folder, inside in (("Waypoints", points), ("Fence", [*_areas(mission.fence)])):
+        parts += [_tag("Folder", _tag("name", folder), *inside)] if inside else []
     for station, spot in (stations or {}).items():
         parts.append(_placemark(station, _shape("Point", "absolute", spot)))
     for moved, way in (moving or {}).items():
-        parts.append(_placemark(moved, _track(way), "route"))
+        parts.append(_placemark(moved, _style("route"), _track(way)))
     return "\n".join((_HEAD, _tag("Document", "\n".join(parts)), "</kml>", ""))
 
 
-def kml_losses(mission: Mission) -> Iterator[str]:
+def kml_losses(mission: Mission, _: object = None) -> Iterator[str]:
     """Yield what of `mission` a KML file does not hold or show."""
-    yield from not_read(mission)
-    yield from rally_left_out(mission, "KML")
+    yield from left_out(mission, "KML")
     yield "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back"
-    frames = {item.frame for item in mission.items}
-    if _ground(mission) is None and frames & ABOVE_HOME:
-        yield "no height of home is known: heights above home are drawn above the ground"
-    if frames & ABOVE_TERRAIN:
-        yield "heights above terrain are drawn above Google Earth's own"
-    if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
-        yield "spline waypoints are joined by straight lines"
 
 
 def _waypoints(mission: Mission) -> Iterator[tuple[int, MissionItem, Spot]]:
@@ -112,13 +99,6 @@ def _ground(mission: Mission) -> float | None:
     return None if home is None or math.isnan(home.altitude) else home.altitude
 
 
-def _description(item: MissionItem) -> str:
-    name = Command(item.command).name.removeprefix("NAV_").replace("_", " ").lower()
-    hold = item.params[0]
-    held = item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) and hold > 0
-    return f"{name}, hold {hold:g} s" if held else name
-
-
 def _areas(fence: Fence) -> Iterator[str]:
     """Yield the areas of `fence`, on the ground, each with its kind in its name; circles too."""
     if not fence:
@@ -126,33 +106,39 @@ def _areas(fence: Fence) -> Iterator[str]:
     frame = LocalFrame(*fence.place)
     for area in areas_of(fence, frame):
         for part in shapely.get_parts(area.shape):
-            rings = ""
-            for ring in shapely.get_rings(part):
-                places = np.transpose(frame.to_geodetic(shapely.get_coordinates(ring)))
-                drawn = _coordinates(*((north, east, 0.0) for north, east in places.tolist()))
-                boundary = "innerBoundaryIs" if rings else "outerBoundaryIs"
-                rings += _tag(boundary, _tag("LinearRing", _tag("coordinates", drawn)))
-            polygon = _tag("Polygon", _tag("tessellate", "1") + rings)
-            yield _placemark(area.name, polygon, "inclusion" if area.inclusion else "exclusion")
+            outline, *holes = (_ring(ring, frame) for ring in shapely.get_rings(part))
+            inner = (_tag("innerBoundaryIs", hole) for hole in holes)
+            edges = _tag("outerBoundaryIs", outline), *inner
+            polygon = _tag("Polygon", _tag("tessellate", "1"), *edges)
+            style = _style("inclusion" if area.inclusion else "exclusion")
+            yield _placemark(area.name, style, polygon)
+
+
+def _ring(ring: BaseGeometry, frame: LocalFrame) -> str:
+    places = np.transpose(frame.to_geodetic(shapely.get_coordinates(ring))).tolist()
+    drawn = _coordinates(*((north, east, 0.0) for north, east in places))
+    return _tag("LinearRing", _tag("coordinates", drawn))
 
 
 def _track(flight: Sequence[tuple[datetime, Spot]]) -> str:
     moments = (moment.astimezone(UTC).isoformat(timespec="milliseconds") for moment, _ in flight)
-    whens = "".join(_tag("when", moment.replace("+00:00", "Z")) for moment in moments)
-    spots = "".join(_tag("gx:coord", _coordinates(spot).replace(",", " ")) for _, spot in flight)
-    return _tag("gx:Track", _tag("altitudeMode", "absolute") + whens + spots)
+    whens = (_tag("when", moment.replace("+00:00", "Z")) for moment in moments)
+    spots = (_tag("gx:coord", _coordinates(spot).replace(",", " ")) for _, spot in flight)
+    return _tag("gx:Track", _tag("altitudeMode", "absolute"), *whens, *spots)
 
 
-def _placemark(name: str, shape: str, style: str = "") -> str:
-    styled = _tag("styleUrl", f"#{style}") if style else ""
-    return _tag("Placemark", _tag("name", _text(name)) + styled + shape)
+def _placemark(name: str, *parts: str) -> str:
+    return _tag("Placemark", _tag("name", _text(name)), *parts)
+
+
+def _style(name: str) -> str:
+    return _tag("styleUrl", f"#{name}")
 
 
 def _shape(kind: str, mode: str, *spots: Spot) -> str:
     """Return a point, or a line that follows the ground where it is on it."""
     drawn = _tag("tessellate", "1") if len(spots) > 1 else ""
-    coordinates = _tag("coordinates", _coordinates(*spots))
-    return _tag(kind, drawn + _tag("altitudeMode", mode) + coordinates)
+    return _tag(kind, drawn, _tag("altitudeMode", mode), _tag("coordinates", _coordinates(*spots)))
 
 
 def _coordinates(*spots: Spot) -> str:
@@ -164,5 +150,5 @@ def _text(text: str) -> str:
     return escape(_ILLEGAL.sub("?", text))
 
 
-def _tag(name: str, inside: str) -> str:
-    return f"<{name}>{inside}</{name}>"
+def _tag(name: str, *inside: str) -> str:
+    return f"<{name}>{''.join(inside)}</{name}>"

@@ -1,8 +1,10 @@
 """What a mission file tells, what it does not hold, and whom it is for."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from faao_mav.errors import counted
 from faao_mav.mission.item import Mission
 
 _NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
@@ -37,28 +39,29 @@ class PlanTarget:
     takes_null: bool = True
 
 
-def not_read(mission: Mission) -> list[str]:
-    """Return what of a vehicle's mission was not read from it, one line each."""
-    return [
-        f"without the {part} that the vehicle may hold: not read from it" for part in mission.unread
-    ]
+def not_read(mission: Mission, then: str = "") -> Iterator[str]:
+    """Yield what of a vehicle's mission was not read from it, one line each, and what follows."""
+    for part in mission.unread:
+        yield f"without the {part} that the vehicle may hold: not read from it{then}"
 
 
-def rally_left_out(mission: Mission, name: str) -> list[str]:
-    """Return that the format `name` holds no rally points, if the mission has any."""
-    points = f"{len(mission.rally)} point{'s' * (len(mission.rally) > 1)}"
-    return [f"{name} holds no rally points: {points} left out"] if mission.rally else []
+def left_out(mission: Mission, name: str) -> Iterator[str]:
+    """Yield what of `mission` the format `name` leaves out, which holds no rally points."""
+    yield from not_read(mission)
+    if mission.rally:
+        yield f"{name} holds no rally points: {counted(len(mission.rally), 'point')} left out"
 
 
-def zeros(mission: Mission, *, for_nan: bool) -> list[str]:
-    """Return what is written as 0: the home where none is known and, `for_nan`, what is not set."""
+def zeros(mission: Mission, *, for_nan: bool) -> Iterator[str]:
+    """Yield what is written as 0: the home where none is known and, `for_nan`, what is not set."""
     places = [
         f"item {number} {name}"
         for number, item in enumerate(mission.items, start=1)
         for name, value in zip(_NAMES, item.numbers, strict=True)
         if for_nan and math.isnan(value)
     ]
-    more = f" and {len(places) - _SHOWN_ITEMS} more" if len(places) > _SHOWN_ITEMS else ""
-    unset = [f"not set (NaN) becomes 0: {', '.join(places[:_SHOWN_ITEMS])}{more}"]
-    home = [] if mission.home else ["no home is known: the file says 0, 0, 0, which means none"]
-    return [*(unset if places else []), *home]
+    if places:
+        more = f" and {len(places) - _SHOWN_ITEMS} more" if len(places) > _SHOWN_ITEMS else ""
+        yield f"not set (NaN) becomes 0: {', '.join(places[:_SHOWN_ITEMS])}{more}"
+    if mission.home is None:
+        yield "no home is known: the file says 0, 0, 0, which means none"

@@ -24,14 +24,14 @@ _SIMPLER = (
 )
 
 _CRUISE_SPEED, _HOVER_SPEED = 15.0, 5.0
-"""Speeds in m/s that QGroundControl assumes of a mission without a speed: its own defaults."""
+"""Speeds in m/s that QGroundControl assumes before the first DO_CHANGE_SPEED: its own defaults."""
 
 _ALTITUDE_MODES = {
     int(frame): mode
     for mode, frames in ((1, ABOVE_HOME), (2, ABOVE_SEA), (4, ABOVE_TERRAIN))
     for frame in frames
 }
-"""QGroundControl's altitude modes by the frames of items; a plan whose items differ has mode 0."""
+"""QGroundControl's altitude modes by the frames of items; the plan has mode 0: each its own."""
 
 Place = TypeVar("Place", Home, RallyPoint)
 
@@ -71,24 +71,20 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
     """Return `mission` as the text of a `.plan` file for `target`, a generic one if None.
 
     NaN is written as null, except for a target that refuses it: there it is 0. A mission without
-    home has a planned home of zeros, because QGroundControl asks for one. The speeds by which
-    QGroundControl estimates times are those of the mission's first DO_CHANGE_SPEED. What the
+    home has a planned home of zeros, because QGroundControl asks for one. What the
     mission has `unread` is told under a key of that name, which QGroundControl passes over. Raises
     `MissionFileError` for a DO_JUMP to no item of the mission.
     """
     whom = target or PlanTarget(0, 0)
-    speeds = [i.params[1] for i in mission.items if i.command == Command.DO_CHANGE_SPEED]
-    speed = next((each for each in speeds if each > 0), None)
-    modes = {_ALTITUDE_MODES.get(item.frame, 0) for item in mission.items} - {0}
     plan: dict[str, Any] = {
         "fileType": "Plan",
         "geoFence": _write_fence(mission.fence),
         "groundStation": "QGroundControl",
         "mission": {
-            "cruiseSpeed": speed or _CRUISE_SPEED,
+            "cruiseSpeed": _CRUISE_SPEED,
             "firmwareType": whom.firmware,
-            "globalPlanAltitudeMode": modes.pop() if len(modes) == 1 else 0,
-            "hoverSpeed": speed or _HOVER_SPEED,
+            "globalPlanAltitudeMode": 0,
+            "hoverSpeed": _HOVER_SPEED,
             "items": list(_write_items(mission, whom)),
             "plannedHomePosition": _write_place(mission.home or Home(0.0, 0.0, 0.0)),
             "vehicleType": whom.vehicle_type,
@@ -104,8 +100,7 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
 
 def plan_losses(mission: Mission, target: PlanTarget | None) -> Iterator[str]:
     """Yield what of `mission` a `.plan` file for `target` does not hold."""
-    for line in not_read(mission):
-        yield f"{line}; QGroundControl clears it there when it uploads this plan"
+    yield from not_read(mission, "; QGroundControl clears it there when it uploads this plan")
     if target is None:
         yield "no autopilot is known: the plan is for a generic one"
     yield from zeros(mission, for_nan=target is not None and not target.takes_null)
@@ -118,13 +113,9 @@ def _check_version(part: Json, version: int) -> None:
 
 
 def _part(file: Json, key: str) -> Json | None:
-    """Return a part of version 2; None for one of version 1 with nothing in it, as of old files."""
+    """Return a part of version 2; None for one with nothing in it, which may be of version 1."""
     part = file.get(key)
-    if part is None:
-        return None
-    told = part.get("version")
-    filled = any(value for key, value in part.value.items() if key != "version")
-    if told is not None and told.value == 1 and not filled:
+    if part is None or not any(value for name, value in part.members.items() if name != "version"):
         return None
     _check_version(part, 2)
     return part

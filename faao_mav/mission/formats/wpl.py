@@ -20,7 +20,7 @@ import numpy as np
 from faao_mav.errors import MissionFileError, quote
 from faao_mav.mission.command import ABOVE_HOME, CIRCLE, FENCE_RETURN_POINT, POLYGON, Command, Frame
 from faao_mav.mission.fence import Fence
-from faao_mav.mission.formats.mission_file import MissionFile, not_read, rally_left_out, zeros
+from faao_mav.mission.formats.mission_file import MissionFile, left_out, zeros
 from faao_mav.mission.item import (
     MAX_ITEMS,
     Home,
@@ -62,10 +62,9 @@ def write_wpl(mission: Mission) -> str:
     return _text(mission.home, mission.items)
 
 
-def wpl_losses(mission: Mission) -> Iterator[str]:
+def wpl_losses(mission: Mission, _: object = None) -> Iterator[str]:
     """Yield what of `mission` the files do not hold."""
-    yield from not_read(mission)
-    yield from rally_left_out(mission, "QGC WPL")
+    yield from left_out(mission, "QGC WPL")
     yield from zeros(mission, for_nan=True)
     if mission.home is not None and math.isnan(mission.home.altitude):
         yield "the altitude of home is not known: the file says 0 m"
