@@ -5,19 +5,13 @@ The command line, the reports, the studies and Python users all call `plan_missi
 
 import time
 from dataclasses import asdict, dataclass, replace
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-import numpy as np
-
-from faao_mav.arrays import Real
 from faao_mav.autopilot import autopilots
 from faao_mav.autopilot.files import parameter_path, plan_target
-from faao_mav.autopilot.predict import predict
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.files import check_writable, write_together
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.formats import (
     check_replaceable,
     comment_for,
@@ -25,7 +19,6 @@ from faao_mav.mission.formats import (
     remove_outdated,
     render_files,
 )
-from faao_mav.mission.formats.kml import write_kml
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.optimizer.pricing import (
     FreshRates,
@@ -43,17 +36,10 @@ from faao_mav.plan.fields import dbm
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle, check_vehicle, convert
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Check, Finding, Level, Limits, check
-from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.search.bound import Bound
-
-DRAWING_START = datetime(2000, 1, 1, tzinfo=UTC)
-"""When the flight in a drawing (.kml) begins: a plan says how long it takes, not when it is."""
-
-_DRAWING_STEP = 1.0
-"""Seconds between the samples of a drawn flight; chosen: a drawing needs no more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,12 +133,8 @@ class Result:
         if conversion is None:
             raise self.no_mission or InputError("there is no mission: the plan was only optimised")
         mission, *beside = mission_files(path, plan)
-        drawn = mission.suffix.lower() == ".kml"
-        contents: dict[str | Path, bytes] = (
-            {mission: draw_mission(self.solution, conversion).encode()}
-            if drawn
-            else render_files(conversion.mission, mission, plan_target(conversion.vehicle)).contents
-        )
+        target = plan_target(conversion.vehicle)
+        contents = render_files(conversion.mission, mission, target).contents
         parameters = parameter_path(mission, plan.vehicle.autopilot)
         if parameters in beside:
             contents[parameters] = render_parameters(
@@ -413,34 +395,3 @@ def _may_lie_beside(mission: Path) -> set[Path]:
     fence = fence_path(mission)
     parameters = {parameter_path(mission, each) for each in autopilots()}
     return parameters if fence is None else {fence, *parameters}
-
-
-def draw_mission(solution: Solution, conversion: Conversion) -> str:
-    """Return the KML document of a mission: its route, the stations, and its predicted flight.
-
-    The flight begins at `DRAWING_START`; stations that move go along with it.
-    """
-    plan = solution.plan
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    ground = plan.origin.elevation
-    names = "base station", "ground user"
-    track = predict(
-        conversion.mission, conversion.vehicle, frame, step=_DRAWING_STEP, wind=plan.wind
-    )
-
-    def spots(places: Real) -> list[tuple[float, float, float]]:
-        latitudes, longitudes = frame.to_geodetic(places[:, :2])
-        heights = places[:, 2] + ground
-        return list(zip(latitudes.tolist(), longitudes.tolist(), heights.tolist(), strict=True))
-
-    moments = [DRAWING_START + timedelta(seconds=t) for t in track.t.tolist()]
-    during = np.clip(predicted_line(solution, track).t, 0.0, plan.flight.duration)
-    stations, moving = {}, {"Flight": list(zip(moments, spots(track.position), strict=True))}
-    for name, station in zip(names, plan.radio.stations, strict=True):
-        way = spots(np.pad(station.at(during), ((0, 0), (0, 1))))
-        if station.moves:
-            moving[name] = list(zip(moments, way, strict=True))
-        else:
-            stations[name] = way[0]
-    title = plan.name or "relay flight"
-    return write_kml(conversion.mission, name=title, stations=stations, moving=moving)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from functools import cache
 from typing import Any
-from xml.etree import ElementTree as Xml
 
 import numpy as np
 import pytest
@@ -11,14 +10,10 @@ from conftest import MakePlan
 from reported import conversion, flown, prediction
 
 from faao_mav import optimize
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.shadowing import shadowed
 from faao_mav.report import figures
 from faao_mav.report.maps import mission_map
-from faao_mav.workflow import DRAWING_START, draw_mission
-
-KML, GX = "{http://www.opengis.net/kml/2.2}", "{http://www.google.com/kml/ext/2.2}"
 
 
 @cache
@@ -157,23 +152,3 @@ def test_what_is_written_on_a_map_covers_nothing() -> None:
             assert not any(box.count_contains(places) for places in (route, *lines))
             assert edge.contains(*box.min)
             assert edge.contains(*box.max)
-
-
-def test_a_drawing_has_the_flight_and_the_stations_where_the_plan_has_them() -> None:
-    solution, plan = flown().solution, flown().solution.plan
-    root = Xml.fromstring(draw_mission(solution, conversion()))
-    names = {element.text for element in root.iter(f"{KML}name")}
-    assert {plan.name, "base station", "ground user"} <= names
-    whens = [element.text or "" for element in root.iter(f"{KML}when")]
-    coordinates = np.array(
-        [[float(x) for x in (each.text or "").split()] for each in root.iter(f"{GX}coord")]
-    )
-    assert len(whens) == len(coordinates) > 60
-    assert whens[0].startswith(DRAWING_START.strftime("%Y-%m-%dT%H:%M:%S"))
-    assert whens == sorted(whens)
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    places = frame.to_local(coordinates[:, 1], coordinates[:, 0])
-    heights = coordinates[:, 2] - plan.origin.elevation
-    assert heights.max() == pytest.approx(plan.flight.altitude, abs=0.5)
-    for w in (solution.w[0], solution.w[-1]):
-        assert abs(places - w).max(axis=1).min() < 3

@@ -1,12 +1,11 @@
 """KML for Google Earth: where a mission goes, to look at. It cannot be read back.
 
-Source: OGC KML 2.3 (07-147r2) and Google's extension `gx:Track`.
+Source: OGC KML 2.3 (07-147r2).
 """
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
+from collections.abc import Iterator
 from typing import TypeAlias
 from xml.sax.saxutils import escape
 
@@ -25,7 +24,7 @@ Spot: TypeAlias = tuple[float, float, float]
 """Latitude and longitude, degrees, and altitude, metres."""
 
 _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
-<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">"""
+<kml xmlns="http://www.opengis.net/kml/2.2">"""
 _STYLES = "\n".join(
     f'<Style id="{name}"><LineStyle><color>{line}</color><width>3</width></LineStyle>'
     f"<PolyStyle><color>{filling}</color></PolyStyle></Style>"
@@ -41,36 +40,28 @@ shows on fields, towns and water, and so do a white edge and a red one."""
 _ILLEGAL = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML 1.0
 
 
-def write_kml(
-    mission: Mission,
-    name: str = "mission",
-    *,
-    stations: Mapping[str, Spot] | None = None,
-    moving: Mapping[str, Sequence[tuple[datetime, Spot]]] | None = None,
-) -> str:
-    """Return a KML document of `mission`: route, waypoints, fence, stations and what moves.
+def write_kml(mission: Mission, name: str = "mission") -> str:
+    """Return a KML document of `mission`: route, waypoints and fence.
 
     The route is a line through the places that items fly to, the waypoints are numbered as the
     items are, from 1. Heights above home become heights above mean sea level by the mission's
     home; without one they are drawn above the ground. ArduPilot's "here" (a TAKEOFF or LAND at
-    0, 0) is the place before it. `stations`, above mean sea level, are marked by their names;
-    what is `moving` goes along Google Earth's time slider.
+    0, 0) is the place before it.
     """
     waypoints = list(_waypoints(mission))
     known = ABOVE_SEA if _ground(mission) is None else ABOVE_SEA | ABOVE_HOME
     above_sea = {item.frame for _, item, _ in waypoints} <= known
-    mode = "absolute" if above_sea else "relativeToGround"
-    parts = [_tag("name", _text(name)), _STYLES]
+    mode = _tag("altitudeMode", "absolute" if above_sea else "relativeToGround")
+    parts = [_named(name), _STYLES]
     if len(waypoints) > 1:
-        route = _shape("LineString", mode, *(spot for *_, spot in waypoints))
-        parts.append(_placemark("Route", _style("route"), route))
-    points = [_placemark(str(number), _shape("Point", mode, spot)) for number, _, spot in waypoints]
+        way = _tag("tessellate", "1"), mode, _coordinates(*(spot for *_, spot in waypoints))
+        parts.append(_placemark("Route", "route", _tag("LineString", *way)))
+    points = [
+        _tag("Placemark", _named(str(number)), _tag("Point", mode, _coordinates(spot)))
+        for number, _, spot in waypoints
+    ]
     for folder, inside in (("Waypoints", points), ("Fence", [*_areas(mission.fence)])):
-        parts += [_tag("Folder", _tag("name", folder), *inside)] if inside else []
-    for station, spot in (stations or {}).items():
-        parts.append(_placemark(station, _shape("Point", "absolute", spot)))
-    for moved, way in (moving or {}).items():
-        parts.append(_placemark(moved, _style("route"), _track(way)))
+        parts += [_tag("Folder", _named(folder), *inside)] if inside else []
     return "\n".join((_HEAD, _tag("Document", "\n".join(parts)), "</kml>", ""))
 
 
@@ -107,47 +98,28 @@ def _areas(fence: Fence) -> Iterator[str]:
     for area in areas_of(fence, frame):
         for part in shapely.get_parts(area.shape):
             outline, *holes = (_ring(ring, frame) for ring in shapely.get_rings(part))
-            inner = (_tag("innerBoundaryIs", hole) for hole in holes)
-            edges = _tag("outerBoundaryIs", outline), *inner
+            edges = _tag("outerBoundaryIs", outline), *(_tag("innerBoundaryIs", h) for h in holes)
             polygon = _tag("Polygon", _tag("tessellate", "1"), *edges)
-            style = _style("inclusion" if area.inclusion else "exclusion")
-            yield _placemark(area.name, style, polygon)
+            yield _placemark(area.name, "inclusion" if area.inclusion else "exclusion", polygon)
 
 
 def _ring(ring: BaseGeometry, frame: LocalFrame) -> str:
     places = np.transpose(frame.to_geodetic(shapely.get_coordinates(ring))).tolist()
-    drawn = _coordinates(*((north, east, 0.0) for north, east in places))
-    return _tag("LinearRing", _tag("coordinates", drawn))
+    return _tag("LinearRing", _coordinates(*((north, east, 0.0) for north, east in places)))
 
 
-def _track(flight: Sequence[tuple[datetime, Spot]]) -> str:
-    moments = (moment.astimezone(UTC).isoformat(timespec="milliseconds") for moment, _ in flight)
-    whens = (_tag("when", moment.replace("+00:00", "Z")) for moment in moments)
-    spots = (_tag("gx:coord", _coordinates(spot).replace(",", " ")) for _, spot in flight)
-    return _tag("gx:Track", _tag("altitudeMode", "absolute"), *whens, *spots)
-
-
-def _placemark(name: str, *parts: str) -> str:
-    return _tag("Placemark", _tag("name", _text(name)), *parts)
-
-
-def _style(name: str) -> str:
-    return _tag("styleUrl", f"#{name}")
-
-
-def _shape(kind: str, mode: str, *spots: Spot) -> str:
-    """Return a point, or a line that follows the ground where it is on it."""
-    drawn = _tag("tessellate", "1") if len(spots) > 1 else ""
-    return _tag(kind, drawn, _tag("altitudeMode", mode), _tag("coordinates", _coordinates(*spots)))
+def _placemark(name: str, style: str, shape: str) -> str:
+    return _tag("Placemark", _named(name), _tag("styleUrl", f"#{style}"), shape)
 
 
 def _coordinates(*spots: Spot) -> str:
     """Return longitude, latitude (0.1 mm) and altitude of places."""
-    return " ".join(f"{east:.9f},{north:.9f},{altitude:.3f}" for north, east, altitude in spots)
+    drawn = (f"{east:.9f},{north:.9f},{altitude:.3f}" for north, east, altitude in spots)
+    return _tag("coordinates", " ".join(drawn))
 
 
-def _text(text: str) -> str:
-    return escape(_ILLEGAL.sub("?", text))
+def _named(name: str) -> str:
+    return _tag("name", escape(_ILLEGAL.sub("?", name)))
 
 
 def _tag(name: str, *inside: str) -> str:
