@@ -1,9 +1,11 @@
 """Whether an autopilot takes a mission, an aircraft can fly it, and it delivers the link."""
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from faao_mav.autopilot import Track, Vehicle
+from faao_mav.autopilot.dialect import name_of
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
@@ -13,10 +15,10 @@ from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
 from faao_mav.validate.demands import Stretch as Stretch
 from faao_mav.validate.energy import EnergyUse, energy_use
+from faao_mav.validate.rule import CHECKS, read_rules
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
-from faao_mav.validate.rule import hits, read_rules
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
@@ -45,10 +47,12 @@ def validate(context: ValidationContext) -> tuple[Finding, ...]:
     vehicle, limits, link = context.vehicle, context.limits, context.link
     shown = {**_CONSTANTS, "vehicle": vehicle, "limits": limits, "link": link}
     found = []
-    for name, index, values in hits(context):
+    for name, index, values in chain.from_iterable(check(context) for check in CHECKS):
         rule = RULES[_PLACE[name]]
         if rule.applies_to(vehicle):
-            found.append(rule.finding(index, shown | context.about(index) | values))
+            item = context.items[index] if index is not None else None
+            about = {"item": item, "command": name_of(item.command) if item is not None else ""}
+            found.append(rule.finding(index, shown | about | values))
 
     def order(finding: Finding) -> tuple[int, int, int]:
         level = _WORST_FIRST.index(finding.level)

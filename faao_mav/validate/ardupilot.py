@@ -43,20 +43,23 @@ _ON_GROUND = {
 }
 
 
-@checks("ardupilot")
+@checks
 def _arming(context: ValidationContext) -> Hits:
     """What arming asks for."""
-    bits = int(context.vehicle.value("arming_items"))
+    bits = int(context.value("arming_items", 0))
     for bit, command in _REQUIRED.items():
         if bits & bit and not any(context.each(command)):
             yield hit("ardupilot-required-item", bits=bits, bit=bit, name=command.name)
     above = [k for k, item in context.each(*FLOWN_TO) if item.frame in ABOVE_TERRAIN]
-    off = ", and TERRAIN_ENABLE is 0" if context.vehicle.value("terrain_enable") == 0 else ""
+    off = ", and TERRAIN_ENABLE is 0" if context.value("terrain_enable") == 0 else ""
     if above:
         yield hit("ardupilot-terrain", above[0], count=len(above), off=off)
+    for k, _ in context.each(Command.DO_LAND_START):
+        if context.value("return_lands") == 0:
+            yield hit("ardupilot-land-start", k)
     if not bits & RALLY_BIT or context.frame is None:
         return
-    limit = context.vehicle.value("rally_limit")
+    limit = context.value("rally_limit")
     places = (context.frame.to_local(p.latitude, p.longitude) for p in context.mission.rally)
     nearest = min((math.hypot(*place) for place in places), default=math.inf)
     if not nearest < (limit or math.inf):
@@ -65,7 +68,7 @@ def _arming(context: ValidationContext) -> Hits:
         yield hit("ardupilot-required-rally", bits=bits, within=within, there=there)
 
 
-@checks("ardupilot")
+@checks
 def _takeoff(context: ValidationContext) -> Hits:
     """How the mission begins, and home that is moved after that."""
     takeoffs = [k for k, _ in context.each(*_TAKEOFFS[context.vehicle.kind])]
@@ -83,7 +86,7 @@ def _takeoff(context: ValidationContext) -> Hits:
             yield hit("ardupilot-set-home", k)
 
 
-@checks("ardupilot")
+@checks
 def _in_order(context: ValidationContext) -> Hits:
     """Items that do not go with the one before them."""
     for (before, first), (k, second) in pairwise(context.flying):
@@ -96,13 +99,7 @@ def _in_order(context: ValidationContext) -> Hits:
         yield hit("ardupilot-spline-last", last)
 
 
-@checks("ardupilot", "plane")
-def _land_start(context: ValidationContext) -> Hits:
-    if context.vehicle.value("return_lands") == 0:
-        yield from (hit("ardupilot-land-start", k) for k, _ in context.each(Command.DO_LAND_START))
-
-
-@checks("ardupilot")
+@checks
 def _items(context: ValidationContext) -> Hits:
     """Items by themselves."""
     for k, item in enumerate(context.items):

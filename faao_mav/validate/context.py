@@ -1,5 +1,6 @@
 """What the rules look at: a mission, its vehicle, and what follows from both."""
 
+import cmath
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -10,20 +11,83 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
-from faao_mav.autopilot.dialect import SpeedChange, name_of
+from faao_mav.autopilot.dialect import SpeedChange
 from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
 from faao_mav.validate.demands import Limits, LinkCheck
 from faao_mav.validate.energy import EnergyUse
-from faao_mav.validate.straight import HOME, PlacedItem, Straight
 
 NAV_LAST = 95
 """Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""
 
 LARGEST = float(np.finfo(np.float32).max)
 """The largest number of single precision, which messages have."""
+
+
+HOME = -1
+"""The index of home, which is no item."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedItem:
+    """Where an item flies to: metres east and north of `ValidationContext.frame`, and above home.
+
+    `index` is the item's, `HOME` for home. `up` is NaN where nothing tells it: heights above
+    terrain, or above the sea without a home.
+    """
+
+    index: int
+    east: float
+    north: float
+    up: float
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        return "home" if self.index == HOME else f"item {self.index + 1}"
+
+    @property
+    def ground(self) -> Real:
+        """East and north, (2,) m."""
+        return np.array([self.east, self.north])
+
+    @property
+    def from_origin(self) -> float:
+        """Metres over ground from the origin of the frame, which is home if there is one."""
+        return math.hypot(self.east, self.north)
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """A straight from one place to the next, ordered by the item at `index`.
+
+    `speed` is what is commanded, m/s; `spline`: the aircraft curves to its end; `jump`: the item
+    is a jump.
+    """
+
+    index: int
+    start: PlacedItem
+    end: PlacedItem
+    speed: float
+    spline: bool = False
+    jump: bool = False
+
+    @property
+    def length(self) -> float:
+        """Metres over ground."""
+        return math.hypot(*(self.end.ground - self.start.ground))
+
+    @property
+    def rise(self) -> float:
+        """Metres upwards; NaN if a height is unknown."""
+        return self.end.up - self.start.up
+
+    def turn(self, onward: "Straight") -> float:
+        """Return the turn from here to the straight `onward`, rad, 0 to pi; 0 without a heading."""
+        before, after = (complex(*(each.end.ground - each.start.ground)) for each in (self, onward))
+        return abs(cmath.phase(after * before.conjugate()))
 
 
 @dataclass(frozen=True)
@@ -56,12 +120,6 @@ class ValidationContext:
         """Yield index and item of the items with one of `commands`."""
         return ((k, item) for k, item in enumerate(self.items) if item.command in commands)
 
-    def about(self, index: int | None) -> dict[str, object]:
-        """Return the `item` at `index` and its `command` by name; nothing for no item."""
-        if index is None:
-            return {}
-        return {"item": self.items[index], "command": name_of(self.items[index].command)}
-
     @property
     def flying(self) -> Iterator[tuple[int, int]]:
         """Index and command of the items that fly, in order."""
@@ -81,8 +139,16 @@ class ValidationContext:
         return tuple((k, item, dialect.stored(own)) for k, item, own in taken)
 
     def parameter(self, key: str) -> tuple[float, str]:
-        """Return the value of the vehicle's parameter `key`, and the name that sets it."""
-        return self.vehicle.value(key), self.vehicle.name_of(key)
+        """Return the value of the vehicle's parameter `key`, and the name that sets it.
+
+        A vehicle that has no such parameter has NaN, with which every comparison is false.
+        """
+        known = key in self.vehicle.type.parameters
+        return self.value(key), self.vehicle.name_of(key) if known else ""
+
+    def value(self, key: str, otherwise: float = math.nan) -> float:
+        """Return the value of `parameter`, `otherwise` for a vehicle that has none."""
+        return self.vehicle.value(key) if key in self.vehicle.type.parameters else otherwise
 
     @cached_property
     def changes(self) -> tuple[SpeedChange | None, ...]:

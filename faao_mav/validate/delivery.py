@@ -48,7 +48,7 @@ _COOLED = 1.0
 """How far below thermal noise, dB, a receiver's may be told before it is doubted. Chosen."""
 
 
-@checks()
+@checks
 def _link(context: ValidationContext) -> Hits:
     """What is wrong with the plan itself, and how the flight carries it out."""
     link = context.link

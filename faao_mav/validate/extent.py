@@ -6,9 +6,8 @@ import numpy as np
 
 from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
-from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.context import HOME, PlacedItem, ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
-from faao_mav.validate.straight import HOME, PlacedItem
 
 FAR = 10.0
 """The distance from home or from item to item, km, that is hardly meant. Chosen."""
@@ -37,27 +36,39 @@ _HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_
 _DELAYS = (*_HOLDS, Command.NAV_DELAY)
 
 
-def _beyond(context: ValidationContext, rule: str, measure: str, limit: float | None) -> Hits:
-    """Yield the places whose `measure`, "up" or "from_origin", m, is beyond `limit`, if any is."""
-    for place in context.places if limit is not None else ():
-        known = measure == "up" or context.home is not None
-        if limit is not None and known and getattr(place, measure) > limit:
-            yield hit(rule, place.index, place=place, limit=limit)
+@checks
+def _beyond(context: ValidationContext) -> Hits:
+    """Places beyond the limits that were given, those of the vehicle's own fence, and any sense."""
+    value, limits, high = context.value, context.limits, context.vehicle.fence_heights[1]
+    kinds = int(value("fence_type", 0)) if value("fence_enable") > 0 else 0
+    radius = value("fence_radius") if kinds & 2 else math.inf
+    for place in context.places:
+        away = place.from_origin if context.home is not None else 0.0
+        for rule, reached, limit in (
+            ("too-high", place.up, HIGHEST),
+            ("above-ceiling", place.up, limits.max_altitude or math.inf),
+            ("beyond-distance", away, limits.max_distance or math.inf),
+            ("ardupilot-fence-ceiling", place.up, high),
+            ("ardupilot-fence-circle", away, radius),
+            ("px4-max-vertical", place.up, high),
+            ("px4-max-horizontal", away, value("fence_distance") or math.inf),
+        ):
+            if reached > limit:
+                yield hit(rule, place.index, place=place, limit=limit)
 
 
-@checks()
-def _places(context: ValidationContext) -> Hits:
-    """Places beyond the limits that were given, and beyond what is sensible."""
-    limits, ceiling = context.limits, context.limits.max_altitude
-    yield from _beyond(context, "too-high", "up", HIGHEST)
-    yield from _beyond(context, "above-ceiling", "up", ceiling)
-    yield from _beyond(context, "beyond-distance", "from_origin", limits.max_distance)
+@checks
+def _heights(context: ValidationContext) -> Hits:
+    """Places that are too low, or higher than many countries allow, and the height of a return."""
+    ceiling, floor = context.limits.max_altitude, context.vehicle.fence_heights[0]
     for place in context.places:
         command = context.items[place.index].command
         if place.up < 0 and command not in LANDINGS | TAKEOFFS:
             yield hit("below-home", place.index, below=-place.up, **_raised(context, place))
         elif place.up < LEAST_HEIGHT and command not in LANDINGS:
             yield hit("near-ground", place.index, place=place, **_raised(context, place))
+        if place.up < floor and command != Command.NAV_LAND:
+            yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
     height, name = context.parameter("return_height")
     if ceiling is not None and height > ceiling:
         newest = context.vehicle.type.parameters["return_height"].newest_name
@@ -76,7 +87,7 @@ def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
     return {"sea": sea, "instead": "use frame 3, height above home, or raise the item"}
 
 
-@checks()
+@checks
 def _distances(context: ValidationContext) -> Hits:
     """How far the places are from home, and from each other."""
     home, farthest = context.mission.home, 1000 * _FARTHEST[context.vehicle.type.hovers]
@@ -95,30 +106,7 @@ def _distances(context: ValidationContext) -> Hits:
             yield hit("long-leg", leg.index, leg=leg, length=leg.length / 1000)
 
 
-@checks("ardupilot")
-def _cage(context: ValidationContext) -> Hits:
-    """The bounds about home that FENCE_ENABLE and the bits of FENCE_TYPE switch on."""
-    value = context.vehicle.value
-    kinds = int(value("fence_type")) if value("fence_enable") != 0 else 0
-    radius, (floor, ceiling) = value("fence_radius"), context.vehicle.fence_heights
-    yield from _beyond(context, "ardupilot-fence-ceiling", "up", ceiling)
-    yield from _beyond(
-        context, "ardupilot-fence-circle", "from_origin", radius if kinds & 2 else None
-    )
-    for place in context.places:
-        if place.up < floor and context.items[place.index].command != Command.NAV_LAND:
-            yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
-
-
-@checks("px4")
-def _px4_cage(context: ValidationContext) -> Hits:
-    """The bounds about home that are on above 0."""
-    far, high = context.vehicle.value("fence_distance"), context.vehicle.fence_heights[1]
-    yield from _beyond(context, "px4-max-horizontal", "from_origin", far if far > 0 else None)
-    yield from _beyond(context, "px4-max-vertical", "up", high)
-
-
-@checks()
+@checks
 def _predicted(context: ValidationContext) -> Hits:
     """How far the predicted flight goes."""
     track, positions, limits = context.track, context.track_positions, context.limits
@@ -136,25 +124,23 @@ def _predicted(context: ValidationContext) -> Hits:
             yield hit("predicted-beyond", int(track.item[worst]), **told)
 
 
-@checks()
+@checks
 def _duration(context: ValidationContext) -> Hits:
     """How long the flight lasts, and what it takes of a battery."""
-    limit, energy, least = context.limits.max_duration, context.energy, 0.0
-    if limit is not None or energy is not None:
-        least = least_duration(context)
-    if limit is not None and least > limit:
+    least, energy = _least_duration(context), context.energy
+    if least > (context.limits.max_duration or math.inf):
         yield hit("too-long", least=least)
-    battery = energy.battery if energy is not None else None
-    if energy is not None and battery is not None:
-        for rule, takes in (
-            ("battery-reserve", least * energy.least_power / JOULES_PER_WH),
-            ("battery-tight", energy.total),
-        ):
-            if takes > battery.usable:
-                yield hit(rule, takes=takes, battery=battery)
+    if energy is None or energy.battery is None:
+        return
+    for rule, takes in (
+        ("battery-reserve", least * energy.least_power / JOULES_PER_WH),
+        ("battery-tight", energy.total),
+    ):
+        if takes > energy.battery.usable:
+            yield hit(rule, takes=takes, battery=energy.battery)
 
 
-def least_duration(context: ValidationContext) -> float:
+def _least_duration(context: ValidationContext) -> float:
     """Return what legs and circles at the commanded speeds and the holds take, s, without ramps.
 
     It is no more than what is predicted: an aeroplane's tail wind and thin air make it quicker.

@@ -90,7 +90,7 @@ class _Fence:
         return int(found[nearest]), float(margins[nearest])
 
 
-@checks()
+@checks
 def _all(context: ValidationContext) -> Hits:
     if context.mission.fence:
         fence = _Fence.of(context)
@@ -140,10 +140,9 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
         k, margin = nearest
         index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
         yield hit("fence-close" if margin < LEAST_MARGIN else "fence-margin", index, margin=margin)
-        if "fence_margin" in context.vehicle.type.parameters:
-            keep, name = context.parameter("fence_margin")
-            if margin < keep:
-                yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
+        keep, name = context.parameter("fence_margin")
+        if margin < keep:
+            yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
 
 
 def _shapes(context: ValidationContext) -> list[Shapes]:

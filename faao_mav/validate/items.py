@@ -22,7 +22,7 @@ _LAND = (-430.0, 8849.0)
 """The lowest and the highest land on Earth, m above sea level: the Dead Sea's shore, Everest."""
 
 
-@checks()
+@checks
 def _beside(context: ValidationContext) -> Hits:
     """Whether there is anything, and what stands beside the items."""
     home, back = context.mission.home, context.mission.fence.breach_return
@@ -43,7 +43,7 @@ def _beside(context: ValidationContext) -> Hits:
         yield hit("rally-height", place=place, then=then)
 
 
-@checks()
+@checks
 def _order(context: ValidationContext) -> Hits:
     """How the mission ends, and what stands behind that."""
     last = len(context.items)
@@ -70,7 +70,7 @@ def _ends(context: ValidationContext, index: int) -> bool:
     return command in dialect.endings
 
 
-@checks()
+@checks
 def _among(context: ValidationContext) -> Hits:
     """Items beside other items: heights, jumps, places."""
     sea, home = (
@@ -94,7 +94,7 @@ def _among(context: ValidationContext) -> Hits:
             yield hit("same-place", leg.end.index, leg=leg)
 
 
-@checks()
+@checks
 def _refused(context: ValidationContext) -> Hits:
     """What is refused on upload."""
     dialect = context.vehicle.type.dialect
@@ -137,7 +137,7 @@ _INSTEAD = {
 """What to do for them where the vehicle hovers."""
 
 
-@checks()
+@checks
 def _stored(context: ValidationContext) -> Hits:
     """What the vehicle's storage loses."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}

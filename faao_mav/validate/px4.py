@@ -7,9 +7,8 @@ from itertools import pairwise
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF
 from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
-from faao_mav.validate.context import NAV_LAST, ValidationContext, at_zero
+from faao_mav.validate.context import HOME, NAV_LAST, Straight, ValidationContext, at_zero
 from faao_mav.validate.rule import Hits, checks, hit
-from faao_mav.validate.straight import HOME, Straight
 
 _SPARE_ANGLE = 0.1
 """How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own."""
@@ -27,7 +26,7 @@ _STRAIGHT = math.radians(5)
 """The turn up to which the way back to a waypoint is no detour, rad. Chosen."""
 
 
-@checks("px4")
+@checks
 def _items(context: ValidationContext) -> Hits:
     """Items by themselves."""
     for k, item in enumerate(context.items):
@@ -47,16 +46,16 @@ def _items(context: ValidationContext) -> Hits:
             yield hit("px4-roi", k, allowed=", ".join(map(str, allowed)))
 
 
-@checks("px4")
+@checks
 def _whole(context: ValidationContext) -> Hits:
     """The mission as a whole, its jumps, and what beside it is to be stored."""
     if context.items and context.items[0].command in LANDINGS:
         yield hit("px4-starts-with-land", 0)
     if context.items and not any(context.each(*FLOWN_TO)):
         yield hit("px4-nothing-to-fly")
-    limit = context.vehicle.value("first_waypoint_distance")
-    for place in context.places[:1] if context.home is not None else ():
-        if 0 < limit <= place.from_origin:
+    limit = context.value("first_waypoint_distance")
+    for place in context.places[:1]:
+        if context.home is not None and 0 < limit <= place.from_origin:
             yield hit("px4-first-waypoint-far", place.index, place=place, limit=limit)
     for k, item, target in context.jumps:
         # A jump to itself is flown.
@@ -74,7 +73,7 @@ def _whole(context: ValidationContext) -> Hits:
             yield hit("px4-fence-size", count=count, limit=most, what=what)
 
 
-@checks("px4")
+@checks
 def _takeoff(context: ValidationContext) -> Hits:
     """Where the take-off stands, where it leads, and whether there has to be one."""
     takeoffs = [k for k, _ in context.each(*TAKEOFFS)]
@@ -97,26 +96,24 @@ def _takeoff(context: ValidationContext) -> Hits:
             yield hit("px4-takeoff-low", place.index, place=place, least=least, **told)
         if away and context.items[place.index].command == Command.NAV_TAKEOFF:
             yield hit("px4-takeoff-elsewhere", place.index, place=place)
-    required = int(context.vehicle.value("takeoff_land_required"))
+    required = int(context.value("takeoff_land_required", 0))
     takeoff, landing = bool(takeoffs), any(context.each(Command.NAV_LAND))
-    both_or_none = "both a take-off and a landing, or neither", takeoff == landing
     what, there = {
+        0: ("nothing", True),
         1: ("a take-off", takeoff),
         2: ("a landing", landing),
         3: ("a take-off and a landing", takeoff and landing),
-        4: both_or_none,
-        5: both_or_none,  # on the ground; in the air 2
-    }.get(required, ("", True))
-    if not there:
+    }.get(required, ("both a take-off and a landing, or neither", takeoff == landing))
+    if not there:  # 5 asks for both on the ground, in the air for what 2 does
         missing = Command.NAV_LAND if takeoff else Command.NAV_TAKEOFF
         rule = "px4-takeoff-or-landing-missing"
         yield hit(rule, required=required, what=what, missing=missing.name)
 
 
-@checks("px4", "plane")
+@checks
 def _landing(context: ValidationContext) -> Hits:
     """The approach to a landing: it starts above it, outside its own orbit, and is not steep."""
-    angle = math.degrees(context.vehicle.value("landing_angle"))
+    angle = math.degrees(context.value("landing_angle"))
     slope = math.tan(math.radians(angle + _SPARE_ANGLE))
     by_index = {place.index: place for place in context.places}
     for k, _ in context.each(Command.NAV_LAND):
@@ -140,7 +137,7 @@ def _landing(context: ValidationContext) -> Hits:
             yield hit("px4-approach-steep", k, **told, most=most, least=least)
 
 
-@checks("px4", "plane")
+@checks
 def _land_start(context: ValidationContext) -> Hits:
     starts = [k for k, _ in context.each(Command.DO_LAND_START)]
     for second in starts[1:]:
@@ -159,14 +156,14 @@ def _land_start(context: ValidationContext) -> Hits:
 
 def _radii(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
     """Yield each leg to a waypoint, with the acceptance radius there, m."""
-    default = context.vehicle.value("acceptance_radius")
+    default = context.value("acceptance_radius")
     for leg in context.legs:
         item = context.items[leg.index]
         if item.command == Command.NAV_WAYPOINT and not leg.jump:
             yield leg, item.params[1] if item.params[1] > 0 else default
 
 
-@checks("px4")
+@checks
 def _radius(context: ValidationContext) -> Hits:
     """Acceptance radii beside the legs and beside each other."""
     for leg, radius in _radii(context):

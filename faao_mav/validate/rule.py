@@ -113,26 +113,14 @@ Hits: TypeAlias = Iterable[Hit]
 Checker: TypeAlias = Callable[["ValidationContext"], Hits]
 
 
-_CHECKS: list[tuple[str | None, str | None, Checker]] = []
-"""The functions that find where rules hold, each for vehicles of an autopilot and a type."""
+CHECKS: list[Checker] = []
+"""The functions that find where rules hold, for any vehicle: the rules say which it is about."""
 
 
-def checks(autopilot: str | None = None, kind: str | None = None) -> Callable[[Checker], Checker]:
-    """Return a decorator of a check for vehicles of `autopilot` and `kind`, None: all."""
-
-    def register(check: Checker) -> Checker:
-        _CHECKS.append((autopilot, kind, check))
-        return check
-
-    return register
-
-
-def hits(context: "ValidationContext") -> Iterator[Hit]:
-    """Yield what all checks about the vehicle of `context` find."""
-    vehicle = context.vehicle
-    for autopilot, kind, check in _CHECKS:
-        if autopilot in (None, vehicle.autopilot) and kind in (None, vehicle.kind):
-            yield from check(context)
+def checks(check: Checker) -> Checker:
+    """Make a function one of `CHECKS`."""
+    CHECKS.append(check)
+    return check
 
 
 def count_of(findings: Sequence[Finding], level: Level) -> str:

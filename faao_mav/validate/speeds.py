@@ -10,11 +10,11 @@ import numpy as np
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.body import CopterBody
 from faao_mav.autopilot.vehicle_type import OVERSPEED, lean_acceleration
+from faao_mav.errors import counted
 from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
-from faao_mav.validate.context import ValidationContext
+from faao_mav.validate.context import HOME, Straight, ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
-from faao_mav.validate.straight import HOME, Straight
 from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
@@ -47,6 +47,9 @@ SHARP = 45.0
 """The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and
 PX4."""
 
+_REVERSAL = math.radians(179)
+"""The turn, rad, beyond which the room that it needs is not reckoned with more. Chosen."""
+
 _SLOW = 3.0
 """The commanded speed, m/s, up to which corners hardly matter. Chosen."""
 
@@ -58,41 +61,30 @@ _CLIMB_SHARE = 0.8
 steep. Chosen."""
 
 
-@checks("ardupilot")
-def _ignored(context: ValidationContext) -> Hits:
-    for k, item in context.each(Command.DO_CHANGE_SPEED):
-        throttle = 0.0 if context.vehicle.type.hovers else item.params[2]
-        if context.changes[k] is None and not throttle > 0:
-            yield hit("ardupilot-speed-ignored", k)
-
-
-@checks("px4")
+@checks
 def _asked(context: ValidationContext) -> Hits:
+    """What DO_CHANGE_SPEED asks for."""
     default, default_name = context.parameter("cruise_speed")
     limit, limit_name = context.parameter("max_speed")
+    least, hovers = context.value("min_speed"), context.vehicle.type.hovers
     for k, item in context.each(Command.DO_CHANGE_SPEED):
-        kind, speed, *_ = item.params
+        kind, speed, throttle, _ = item.params
+        if context.changes[k] is None and (hovers or not throttle > 0):
+            yield hit("ardupilot-speed-ignored", k)
         if not speed > 0:
             yield hit("px4-speed-default", k, default=default, name=default_name)
-        elif kind in (2, 3):
+            continue
+        if kind in (2, 3):
             yield hit("px4-speed-type", k)
         if speed > limit:
             yield hit("px4-speed-capped", k, limit=limit, name=limit_name)
-
-
-@checks("ardupilot", "plane")
-@checks("px4", "plane")
-def _airspeeds(context: ValidationContext) -> Hits:
-    least, top = context.vehicle.value("min_speed"), context.vehicle.value("max_speed")
-    for k, item in context.each(Command.DO_CHANGE_SPEED):
-        kind, speed, *_ = item.params
-        if speed > 0 and not least <= speed <= top:
-            yield hit("px4-plane-speed", k, least=least, top=top)
+        if speed < least or speed > limit:
+            yield hit("px4-plane-speed", k, least=least, top=limit)
             if kind == 0:
-                yield hit("ardupilot-plane-speed", k, least=least, top=top)
+                yield hit("ardupilot-plane-speed", k, least=least, top=limit)
 
 
-@checks(kind="copter")
+@checks
 def _lean(context: ValidationContext) -> Hits:
     top = context.vehicle.top_airspeed
     changes = ((change, -k) for k, change in enumerate(context.changes) if change is not None)
@@ -129,7 +121,7 @@ def beyond_lean(solution: "Solution", vehicle: Vehicle) -> str | None:
     )
 
 
-@checks(kind="copter")
+@checks
 def _slow(context: ValidationContext) -> Hits:
     """Runs of neighbouring legs that stay below their commanded speed."""
     pairs = _reached_speeds(context)
@@ -172,7 +164,7 @@ def _long_legs(context: ValidationContext) -> Iterator[Straight]:
     return (leg for leg in context.legs if leg.length >= _SHORTEST)
 
 
-@checks()
+@checks
 def _limits(context: ValidationContext) -> Hits:
     """Speeds and accelerations beside those of the plan's vehicle."""
     before, most, above = None, context.limits.max_speed or math.inf, []
@@ -206,35 +198,28 @@ def _corners(context: ValidationContext) -> Iterator[tuple[Straight, Straight, f
             yield before, after, before.turn(after)
 
 
-@checks(kind="copter")
-def _sharp(context: ValidationContext) -> Hits:
-    sharp = [
-        (math.degrees(turn), -leg.index, leg)
-        for leg, _, turn in _corners(context)
-        if leg.speed > _SLOW and math.degrees(turn) > SHARP
-    ]
-    if sharp:
-        (turn, _, leg), slow = max(sharp), ""
-        passing = context.vehicle.flight_model().corner_speed(math.radians(turn))
-        if passing is not None:
-            slow = f", passed at about {passing:.1f} m/s"
-        count = "1 corner" if len(sharp) == 1 else f"{len(sharp)} corners"
-        yield hit("sharp-corners", leg.index, count=count, turn=turn, leg=leg, slow=slow)
-
-
-@checks(kind="plane")
-def _tight(context: ValidationContext) -> Hits:
-    bank = context.vehicle.value("roll_limit")
+@checks
+def _turns(context: ValidationContext) -> Hits:
+    """Corners for which a copter slows down, and those that a plane cannot fly."""
+    bank, sharp = context.value("roll_limit"), []
     for before, after, turn in _corners(context):
+        if before.speed > _SLOW and math.degrees(turn) > SHARP:
+            sharp.append((turn, -before.index, before))
         radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
-        needed = radius * math.tan(min(turn, math.radians(179)) / 2)
-        room = min(before.length, after.length)
+        needed, room = radius * math.tan(min(turn, _REVERSAL) / 2), min(before.length, after.length)
         if needed > room:
             told = {"turn": math.degrees(turn), "bank": math.degrees(bank), "needed": needed}
             yield hit("turn-too-tight", before.index, leg=before, room=room, **told)
+    if sharp and context.vehicle.type.hovers:
+        (turn, _, leg), slow = max(sharp), ""
+        passing = context.vehicle.flight_model().corner_speed(turn)
+        if passing is not None:
+            slow = f", passed at about {passing:.1f} m/s"
+        count, turn = counted(len(sharp), "corner"), math.degrees(turn)
+        yield hit("sharp-corners", leg.index, count=count, turn=turn, leg=leg, slow=slow)
 
 
-@checks()
+@checks
 def _steep(context: ValidationContext) -> Hits:
     climb, descent = (context.vehicle.value(each) for each in ("climb_speed", "descent_speed"))
     waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT)}

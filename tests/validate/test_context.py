@@ -7,8 +7,8 @@ from judged import FRAME, HOME, PX4, given, latlon
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.item import Mission
+from faao_mav.validate.context import HOME as AT_HOME
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.straight import HOME as AT_HOME
 
 
 def test_places_count_from_home_in_every_frame() -> None:
