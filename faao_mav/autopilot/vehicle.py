@@ -162,7 +162,8 @@ class Vehicle:
         if "fence_height" in self.type.parameters:
             high = self.value("fence_height")
             return -math.inf, high if high > 0 else math.inf
-        kinds = int(self.value("fence_type")) if self.value("fence_enable") != 0 else 0
+        fenced = "fence_type" in self.type.parameters and self.value("fence_enable") != 0
+        kinds = int(self.value("fence_type")) if fenced else 0
         return (
             self.value("fence_floor") if kinds & 8 else -math.inf,
             self.value("fence_ceiling") if kinds & 1 else math.inf,
