@@ -124,6 +124,9 @@ class FreeArea:
 
     shape: BaseGeometry
 
+    def __post_init__(self) -> None:
+        shapely.prepare(self.shape)
+
     @classmethod
     def of(cls, areas: Sequence[Area], *, any_inclusion: bool) -> "FreeArea":
         """Return what `areas` leave; `any_inclusion` as in `free_area`."""
@@ -132,11 +135,6 @@ class FreeArea:
             free = shapely.box(-FARTHEST, -FARTHEST, FARTHEST, FARTHEST)
         out = shapely.union_all([area.shape for area in areas if not area.inclusion])
         return cls(polygonal(free - out))
-
-    @cached_property
-    def _prepared(self) -> BaseGeometry:
-        shapely.prepare(self.shape)
-        return self.shape
 
     @property
     def empty(self) -> bool:
@@ -159,7 +157,7 @@ class FreeArea:
 
     def covers(self, points: Real) -> Flags:
         """Return which of `points` (n, 2) lie inside or on the edge, (n,)."""
-        return np.asarray(shapely.covers(self._prepared, shapely.points(points)), dtype=np.bool_)
+        return np.asarray(shapely.covers(self.shape, shapely.points(points)), dtype=np.bool_)
 
     def connected(self, points: Real) -> bool:
         """Return whether all `points` (n, 2) are in one part of the area."""
@@ -172,7 +170,7 @@ class FreeArea:
         Below 0 where it leaves the area: by how far it does.
         """
         line = shapely.LineString(path) if len(path) > 1 else shapely.Point(path[0])
-        if shapely.covers(self._prepared, line):
+        if shapely.covers(self.shape, line):
             return float(shapely.distance(self.shape.boundary, line))
         outside = shapely.get_coordinates((line - self.shape).segmentize(1.0))
         return -float(shapely.distance(self.shape, shapely.points(outside)).max(initial=0.0))
@@ -213,27 +211,19 @@ class FreeArea:
         """
         for simpler in _SIMPLER:
             inner, outer = (
-                self.shape.buffer(by, join_style="mitre").simplify(simpler)
+                polygonal(self.shape.buffer(by, join_style="mitre").simplify(simpler))
                 for by in (-simpler, simpler)
             )
-            way = _way(inner, start, end)
+            way = shortest_way(inner, start, end)
             if way is not None and self.covers_path(way):
-                least = _way(outer, start, end)
-                if least is not None and _length(way) <= _LONGER * _length(least):
+                least = shortest_way(outer, start, end)
+                if least is None:
+                    continue
+                longer, shorter = (shapely.LineString(each).length for each in (way, least))
+                if longer <= _LONGER * shorter:
                     return way
-        return shortest_way(self._prepared, start, end)
+        return shortest_way(self.shape, start, end)
 
     def covers_path(self, path: Real) -> bool:
         """Return whether the polyline `path` (n, 2) keeps inside."""
-        return bool(shapely.covers(self._prepared, shapely.LineString(path)))
-
-
-def _way(shape: BaseGeometry, start: Real, end: Real) -> Real | None:
-    """Return the shortest way from `start` to `end` in the part of `shape` that has an area."""
-    flat = polygonal(shape)
-    shapely.prepare(flat)
-    return shortest_way(flat, start, end)
-
-
-def _length(way: Real) -> float:
-    return float(shapely.LineString(way).length)
+        return bool(shapely.covers(self.shape, shapely.LineString(path)))

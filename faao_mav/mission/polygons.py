@@ -20,13 +20,14 @@ _FLAT = 1e-9
 
 
 def shortest_way(area: BaseGeometry, start: Real, end: Real) -> Real | None:
-    """Return the corners (k, 2) of the shortest way in `area`, a prepared (multi)polygon, or None.
+    """Return the corners (k, 2) of the shortest way in `area`, a (multi)polygon, or None.
 
     `start` and `end` are (2,); both are corners of the way. It is found by A* over the corners that
     see each other. A shortest way turns only at corners of the area that point inward (those of an
     obstacle), and only around them: the straights before and after touch the edge there and do not
     cross it.
     """
+    shapely.prepare(area)
     if not shapely.covers(area, shapely.points([start, end])).all():
         return None
     before, corners, after = _inward_corners(area)

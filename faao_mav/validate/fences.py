@@ -1,9 +1,8 @@
 """The fence: what of the mission leaves it, how near it comes, whether the vehicle keeps it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
-from typing import Any, Self, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import shapely
@@ -12,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from faao_mav.arrays import Flags
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.fence_area import Area, FreeArea, areas_of, free_area
+from faao_mav.mission.fence_area import FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
 from faao_mav.vector import lengths
@@ -31,28 +30,18 @@ _STILL = 0.1
 """The speed, m/s, below which an aircraft heads nowhere. Chosen."""
 
 
-@dataclass(frozen=True, slots=True)
 class _Fence:
-    """A fence in the plane of `frame`.
+    """The fence of a mission that has one, in the plane; without a frame about its own place.
 
     `allowed` is where its `areas` let the aircraft be, their edges included. `any_inclusion`: one
     inclusion is enough, as PX4 and ArduPilot's FENCE_OPTIONS 2 have it; else all have to hold.
     """
 
-    frame: LocalFrame
-    areas: tuple[Area, ...]
-    any_inclusion: bool
-    allowed: FreeArea
-
-    @classmethod
-    def of(cls, context: ValidationContext) -> Self:
-        """Return the fence of a mission that has one, without a local frame about its own place."""
-        frame = context.frame or LocalFrame(*context.mission.fence.place)
-        any_inclusion = context.vehicle.type.fence_needs_one_inclusion(context.vehicle)
-        areas = areas_of(context.mission.fence, frame)
-        allowed = FreeArea.of(areas, any_inclusion=any_inclusion)
-        shapely.prepare(allowed.shape)
-        return cls(frame, areas, any_inclusion, allowed)
+    def __init__(self, context: ValidationContext) -> None:
+        self.frame = context.frame or LocalFrame(*context.mission.fence.place)
+        self.any_inclusion = context.vehicle.type.fence_needs_one_inclusion(context.vehicle)
+        self.areas = areas_of(context.mission.fence, self.frame)
+        self.allowed = FreeArea.of(self.areas, any_inclusion=self.any_inclusion)
 
     def leave(self, shapes: Shapes) -> Flags:
         """Return which of `shapes` (n,) leave the fence, (n,)."""
@@ -93,7 +82,7 @@ class _Fence:
 @checks
 def _all(context: ValidationContext) -> Hits:
     if context.mission.fence:
-        fence = _Fence.of(context)
+        fence = _Fence(context)
         yield from _points(context, fence)
         yield from _ways(context, fence)
         yield from _kept(context, fence)

@@ -227,20 +227,19 @@ def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, floa
     if last < first:
         return math.inf, 0.0
 
-    def nearest(starts: Real) -> tuple[float, float]:
-        """Return the least mean square distance of these `starts`, m², and the one that has it."""
+    def squares(starts: Real) -> Real:
+        """Return the mean square distances of these `starts`, m²."""
         at = flight.at((starts[:, None] + t).ravel()).reshape(len(starts), *w.shape)
-        squares = np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1)
-        return float(squares.min()), float(starts[np.argmin(squares)])
+        return np.asarray(np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1))
 
     coarse = np.arange(first, last + _COARSE, _COARSE)
     around = coarse[lengths(flight.at(coarse + begin) - w[0]) < reach]
     if not len(around):
         return math.inf, 0.0
-    near = nearest(around)[1]
+    near = around[squares(around).argmin()]
     fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
-    square, start = nearest(fine)
-    return math.sqrt(square) / reach, start
+    found = squares(fine)
+    return math.sqrt(found.min()) / reach, float(fine[found.argmin()])
 
 
 def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:

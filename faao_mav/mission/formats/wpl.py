@@ -200,12 +200,9 @@ class _Row:
 
     def home(self) -> Home | None:
         # Every reader takes row 0 for home: an item there would never be flown.
-        for field, told, known in (
-            ("command", self.item.command, (Command.NAV_WAYPOINT, 0)),
-            ("frame", self.item.frame, (Frame.GLOBAL, *ABOVE_HOME)),
-        ):
-            if told not in known:
-                expected = f"{known[0]:d}: row 0 is the home position, not an item"
-                raise self.wrong(field, expected)
+        if self.item.command not in (Command.NAV_WAYPOINT, 0):
+            raise self.wrong("command", "16: row 0 is the home position, not an item")
+        if self.item.frame not in (Frame.GLOBAL, *ABOVE_HOME):
+            raise self.wrong("frame", "0: row 0 is the home position, not an item")
         place = self.item.x, self.item.y, self.item.z
         return Home(*place) if any(place) else None
