@@ -16,7 +16,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.plan.energy import PowerOptions
 from faao_mav.power import FixedWing, PowerModel, RotaryWing
 from faao_mav.validate import Finding, ValidationContext, validate
-from faao_mav.validate.energy import EnergyUse, energy_use
+from faao_mav.validate.demands import EnergyUse, energy_use
 
 TABLE = cast("RotaryWing", PowerOptions().model(hovers=True))
 PLANE = cast("FixedWing", PowerOptions().model(hovers=False))

@@ -8,7 +8,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.rough import RoughFlight
 from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
-from faao_mav.validate.energy import energy_use
+from faao_mav.validate.demands import energy_use
 from faao_mav.vector import lengths
 
 _HEIGHT, _ABOVE, _WIDE = 70, 50, 560

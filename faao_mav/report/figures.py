@@ -15,7 +15,7 @@ from faao_mav.report.maps import route_map
 from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.validate.energy import EnergyUse
+from faao_mav.validate.demands import EnergyUse
 from faao_mav.vector import lengths
 
 if TYPE_CHECKING:

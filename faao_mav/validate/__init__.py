@@ -11,10 +11,10 @@ from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
 from faao_mav.validate import ardupilot, delivery, extent, fences, items, px4, speeds
 from faao_mav.validate.context import ValidationContext as ValidationContext
+from faao_mav.validate.demands import EnergyUse, energy_use
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
 from faao_mav.validate.demands import Stretch as Stretch
-from faao_mav.validate.energy import EnergyUse, energy_use
 from faao_mav.validate.rule import CHECKS, read_rules
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level

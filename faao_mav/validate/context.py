@@ -16,8 +16,7 @@ from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
-from faao_mav.validate.demands import Limits, LinkCheck
-from faao_mav.validate.energy import EnergyUse
+from faao_mav.validate.demands import EnergyUse, Limits, LinkCheck
 
 NAV_LAST = 95
 """Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""

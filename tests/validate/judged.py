@@ -31,7 +31,7 @@ from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan.energy import Battery
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, ValidationContext, validate
-from faao_mav.validate.energy import EnergyUse
+from faao_mav.validate.demands import EnergyUse
 
 HOME = Home(-35.363262, 149.165237, 584.0)
 FRAME = LocalFrame(HOME.latitude, HOME.longitude)
