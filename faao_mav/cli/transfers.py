@@ -154,8 +154,10 @@ def download(
     found, mission = held.vehicle, held.mission
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
     written = write_noted(mission, out, target)
-    areas = len(mission.fence.polygons) + len(mission.fence.circles)
-    told = {"fence": f"{areas} fence areas", "rally points": f"{len(mission.rally)} rally points"}
+    told = {
+        "fence": f"{len(mission.fence.areas)} fence areas",
+        "rally points": f"{len(mission.rally)} rally points",
+    }
     told |= {part: f"{part} not read" for part in mission.unread}
     typer.echo(f"vehicle      {found}")
     typer.echo(f"mission      {len(mission.items)} items, {', '.join(told.values())}")

@@ -109,8 +109,8 @@ class Mission:
 
     def __repr__(self) -> str:
         """Say how large it is, in a line."""
-        zones = len(self.fence.polygons) + len(self.fence.circles)
-        return f"<Mission: {len(self.items)} items, {zones} zones, {len(self.rally)} rally points>"
+        zones, points = len(self.fence.areas), len(self.rally)
+        return f"<Mission: {len(self.items)} items, {zones} zones, {points} rally points>"
 
     @property
     def first_place(self) -> LatLon | None:
