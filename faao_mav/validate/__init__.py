@@ -31,7 +31,6 @@ RULES = tuple(read_rules(_CONSTANTS))
 """All rules, in the order of their table, in which findings about one item are given."""
 
 _PLACE = {rule.id: n for n, rule in enumerate(RULES)}
-_WORST_FIRST = list(Level)
 
 
 def validate(context: ValidationContext) -> tuple[Finding, ...]:
@@ -54,11 +53,8 @@ def validate(context: ValidationContext) -> tuple[Finding, ...]:
             about = {"item": item, "command": name_of(item.command) if item is not None else ""}
             found.append(rule.finding(index, shown | about | values))
 
-    def order(finding: Finding) -> tuple[int, int, int]:
-        level = _WORST_FIRST.index(finding.level)
-        return level, finding.item or 0, _PLACE[finding.rule]
-
-    return tuple(sorted(found, key=order))
+    found.sort(key=lambda each: (list(Level).index(each.level), each.item or 0, _PLACE[each.rule]))
+    return tuple(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

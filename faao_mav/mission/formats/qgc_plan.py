@@ -56,7 +56,7 @@ def read_qgc_plan(text: str) -> MissionFile:
     points = rally["points"].each(MAX_CORNERS) if rally else []
     whom = plan.get("firmwareType"), plan.get("vehicleType")
     firmware, vehicle_type = (None if each is None else each.whole(255) for each in whom)
-    unread = file.value.get("unread")
+    unread = file.members.get("unread")
     mission = Mission(
         _read_items(plan["items"]),
         _read_place(home, Home) if home and any(home.numbers(3, "not known")) else None,
@@ -71,12 +71,12 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
     """Return `mission` as the text of a `.plan` file for `target`, a generic one if None.
 
     NaN is written as null, except for a target that refuses it: there it is 0. A mission without
-    home has a planned home of zeros, because QGroundControl asks for one. What the
-    mission has `unread` is told under a key of that name, which QGroundControl passes over. Raises
+    home has a planned home of zeros, because QGroundControl asks for one. What the mission has
+    `unread` is told under a key of that name, which QGroundControl passes over. Raises
     `MissionFileError` for a DO_JUMP to no item of the mission.
     """
     whom = target or PlanTarget(0, 0)
-    plan: dict[str, Any] = {
+    plan = {
         "fileType": "Plan",
         "geoFence": _write_fence(mission.fence),
         "groundStation": "QGroundControl",
@@ -93,9 +93,8 @@ def write_qgc_plan(mission: Mission, target: PlanTarget | None = None) -> str:
         "rallyPoints": {"points": list(map(_write_place, mission.rally)), "version": 2},
         "version": 1,
     }
-    if mission.unread:
-        plan["unread"] = list(mission.unread)
-    return json.dumps(plan, indent=4, allow_nan=False) + "\n"
+    plan |= {"unread": mission.unread} if mission.unread else {}
+    return json.dumps(plan, indent=4, allow_nan=False, sort_keys=True) + "\n"
 
 
 def plan_losses(mission: Mission, target: PlanTarget | None) -> Iterator[str]:
@@ -179,7 +178,7 @@ def _write_items(mission: Mission, whom: PlanTarget) -> Iterator[dict[str, Any]]
         params = [not_set if math.isnan(value) else value for value in item.numbers]
         mode = _ALTITUDE_MODES.get(item.frame)
         shown = {"AMSLAltAboveTerrain": None, "Altitude": params[6], "AltitudeMode": mode}
-        yield (shown if mode else {}) | {
+        yield (shown if mode is not None else {}) | {
             "autoContinue": item.autocontinue,
             "command": int(item.command),
             "doJumpId": number,
@@ -206,20 +205,16 @@ def _read_fence(fence: Json) -> Fence:
 
 
 def _write_fence(fence: Fence) -> dict[str, Any]:
+    polygons = [_zone(area, polygon=area.vertices) for area in fence.polygons]
     circles = [
-        {
-            "circle": {"center": list(circle.center), "radius": circle.radius},
-            "inclusion": circle.inclusion,
-            "version": 1,
-        }
-        for circle in fence.circles
-    ]
-    polygons = [
-        {"inclusion": polygon.inclusion, "polygon": polygon.vertices, "version": 1}
-        for polygon in fence.polygons
+        _zone(area, circle={"center": area.center, "radius": area.radius}) for area in fence.circles
     ]
     back = {"breachReturn": _write_place(fence.breach_return)} if fence.breach_return else {}
     return {"circles": circles, "polygons": polygons, "version": 2, **back}
+
+
+def _zone(area: Polygon | Circle, **outline: object) -> dict[str, Any]:
+    return {**outline, "inclusion": area.inclusion, "version": 1}
 
 
 def _pair(place: Json) -> LatLon:
