@@ -14,7 +14,7 @@ from faao_mav.optimizer.pricing import fresh_rates, saturation
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.relay import forward_greedily
 from faao_mav.report import summary
-from faao_mav.report.figures import queue
+from faao_mav.report.figures import plan_figures
 from faao_mav.schedule.precoder_table import precoder_table
 from faao_mav.schedule.prediction import price_flight
 from faao_mav.workflow import Result, plan_mission
@@ -49,7 +49,7 @@ def test_everything_tells_the_same(small_plan: MakePlan, kind: dict[str, Any]) -
     assert predicted["delivered_rate_by_position"] == flown.delivered_by_position
 
     # the queue is in megabytes of a bit/s/Hz for half a second on 20 MHz
-    (axes,) = queue(solution, flown).axes
+    (axes,) = next(each.figure.axes for each in plan_figures(result) if each.name == "queue")
     assert axes.get_ylabel() == "waiting, megabytes"
     lines = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.lines}
     assert lines["planned"] == pytest.approx(1.25 * solution.relayed.queue)

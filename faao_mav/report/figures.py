@@ -1,22 +1,23 @@
 """The figures of one flight, of a plan or of a mission alone: m, s, m/s, bit/s/Hz, watts."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot import Track
 from faao_mav.optimizer.shadowing import Shadowed, arriving
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.report.maps import route_map
+from faao_mav.report.debrief import FromLog
+from faao_mav.report.maps import mission_map, route_map
 from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.validate.demands import EnergyUse
+from faao_mav.validate import Check
 from faao_mav.vector import lengths
+from faao_mav.workflow import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,6 +26,15 @@ if TYPE_CHECKING:
 
 _COLOURS = {"planned": SERIES[0], "predicted": SERIES[1], "flown": SERIES[2]}
 """Of the curves of these names, in all plots; of others by their order."""
+
+
+class Shown(NamedTuple):
+    """A figure of the page: a name for its identifiers, its heading, and what it shows."""
+
+    name: str
+    heading: str
+    figure: "Figure"
+    title: str
 
 
 class _Plot(NamedTuple):
@@ -54,7 +64,8 @@ def flight_figure(
         column = [figure.add_subplot(grid[0, 1])]
         column += [figure.add_subplot(grid[k, 1], sharex=column[0]) for k in (1, 2)]
         column[2].sharey(column[1])
-        _draw(column, _speed(solution, conversion), *_hops(solution, prediction))
+        flights = _flights(solution, prediction)
+        _draw(column, _speed(solution, conversion), *_hops(solution, flights))
         route_map(solution, conversion, plot)
     return figure
 
@@ -73,52 +84,71 @@ def route_figure(
     return figure
 
 
-def apart(solution: Solution, prediction: Prediction, flown: Prediction) -> "Figure":
-    """Return how far the flight is from the plan at equal times: predicted, and as flown."""
-    flights = {"predicted": prediction, "flown": flown}
-    off = {name: (solution.t, lengths(each.w - solution.w)) for name, each in flights.items()}
-    return _figure(_Plot("distance from the plan, m", off))
+def mission_figures(check: Check, *, alone: bool) -> Iterator[Shown]:
+    """Yield those of a mission: its map and its motion where it is `alone`, and its energy."""
+    if alone and (track := check.track) is not None:
+        title = "Map of the predicted flight with the mission's items and its fence, metres"
+        yield Shown("mission-map", "Mission", mission_map(check.mission, track), title)
+        speed = _Plot("ground speed, m/s", {"": (track.t, lengths(track.velocity[:, :2]))})
+        height = _Plot("height above home, m", {"": (track.t, track.position[:, 2])})
+        title = "Predicted ground speed and height above home over time"
+        yield Shown("mission-motion", "Flight", _figure(speed, height), title)
+    if (use := check.energy) is not None:
+        what, stored = "energy that is used", _Plot("used, Wh", {"": (use.t, use.used)})
+        if use.battery is not None:
+            full = use.battery.capacity_wh
+            reserve = {"reserve": full - use.battery.usable}
+            what = "energy that is left"
+            stored = _Plot("left, Wh", {"": (use.t, full - use.used)}, reserve)
+        title = f"Power of the whole predicted flight over time, and the {what}"
+        figure = _figure(_Plot("power, W", {"": (use.t, use.power)}), stored)
+        yield Shown("energy", "Energy", figure, title)
 
 
-def motion(solution: Solution, conversion: Conversion | None = None) -> "Figure":
-    """Return speed and acceleration over time with v_max, v_min and a_max.
-
-    Of a plan that leaves a(0) unbounded, as the paper does, that is left out.
-    """
-    plan = solution.plan
-    first = 0 if plan.flight.bound_first_acceleration else 1
-    needed = solution.t[first:], lengths(solution.a)[first:]
-    limit = {"a_max": plan.vehicle.max_acceleration}
-    return _figure(
-        _speed(solution, conversion),
-        _Plot("acceleration, m/s²", {"planned": needed}, limit),
+def plan_figures(result: Result, log: FromLog | None = None) -> Iterator[Shown]:
+    """Yield those of a plan: as planned, as its mission is predicted, and as flown in a `log`."""
+    solution, conversion, prediction = result.solution, result.conversion, result.prediction
+    plan, t, rate = solution.plan, solution.t, solution.plan.radio.maximised
+    flown = log.found.flown if log is not None else None
+    flights = _flights(solution, prediction, flown)
+    (east, north), (to_east, to_north) = plan.flight.start, plan.flight.end
+    title = (
+        f"Map of the route from ({east:g}, {north:g}) to ({to_east:g}, {to_north:g}), east and "
+        "north in metres, coloured by speed, with stations, waypoints by item number, flights and "
+        "the fence"
     )
+    yield Shown("route", "Route", route_figure(solution, conversion, flown), title)
+    if log is not None:
+        apart = {"predicted": log.found.predicted, "flown": log.found.flown}
+        off = {name: (t, lengths(each.w - solution.w)) for name, each in apart.items()}
+        title = "Distance from the planned place at equal times, as predicted and as flown"
+        figure = _figure(_Plot("distance from the plan, m", off))
+        yield Shown("apart", "Off the plan", figure, title)
+    first = 0 if plan.flight.bound_first_acceleration else 1  # the paper leaves a(0) unbounded
+    needed = {"planned": (t[first:], lengths(solution.a)[first:])}
+    acceleration = _Plot("acceleration, m/s²", needed, {"a_max": plan.vehicle.max_acceleration})
+    title = "Speed and acceleration over time, with their limits"
+    yield Shown("motion", "Motion", _figure(_speed(solution, conversion), acceleration), title)
+    hops = _figure(*_hops(solution, flights), sharey=True)
+    yield Shown("rates", "Link", hops, "Rates of both links over time")
+    held, unit = _of_a_slot(plan)
+    waiting = {name: (t, held * flight.relayed.queue) for name, flight in flights.items()}
+    buffer = {"buffer": most} if (most := plan.radio.relay.buffer_mbytes) else {}
+    half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
+    title = f"What the relay has received and not yet forwarded, over time{half}"
+    yield Shown("queue", "Queue", _figure(_Plot(f"waiting, {unit}", waiting, buffer)), title)
+    if (under := result.shadowed) is not None:
+        title = f"What has arrived over time, as {rate} counts it: planned without shadowing; "
+        title += "with it the median, and in the band eight of ten, one above, one below"
+        yield Shown("arrival", "What arrives", _arrival(solution, under), title)
+    begun, ended = solution.history[0], solution.history[-1]
+    title = f"{rate} after each iteration, from {begun:.4f} to {ended:.4f} bit/s/Hz"
+    yield Shown("convergence", "Convergence", _convergence(solution), title)
+    title = "Power on each stream over time, base station and UAV, strongest stream first"
+    yield Shown("power", "Precoders", _precoder_power(solution), title)
 
 
-def rates(
-    solution: Solution, prediction: Prediction | None = None, flown: Prediction | None = None
-) -> "Figure":
-    """Return I_U and I_G of (7), (8) in every slot: planned, predicted, flown."""
-    return _figure(*_hops(solution, prediction, flown), sharey=True)
-
-
-def queue(
-    solution: Solution, prediction: Prediction | None = None, flown: Prediction | None = None
-) -> "Figure":
-    """Return what waits in the relay over time: planned, where the flight is predicted, and flown.
-
-    Bits per hertz of bandwidth, or megabytes where the plan has a bandwidth.
-    """
-    buffer = solution.plan.radio.relay.buffer_mbytes
-    held, unit = _of_a_slot(solution.plan)
-    curves = {
-        name: (solution.t, held * flight.relayed.queue)
-        for name, flight in _flights(solution, prediction, flown).items()
-    }
-    return _figure(_Plot(f"waiting, {unit}", curves, {"buffer": buffer} if buffer else {}))
-
-
-def arrival(solution: Solution, under: Shadowed) -> "Figure":
+def _arrival(solution: Solution, under: Shadowed) -> "Figure":
     """Return what has arrived over time: planned, and under shadowing with a band of 0.1 to 0.9."""
     held, unit = _of_a_slot(solution.plan)
     t = solution.t + solution.plan.flight.time_step
@@ -135,7 +165,7 @@ def arrival(solution: Solution, under: Shadowed) -> "Figure":
     return figure
 
 
-def precoder_power(solution: Solution) -> "Figure":
+def _precoder_power(solution: Solution) -> "Figure":
     """Return the power on each stream, the squared norm of each column of P_B and P_U, over time.
 
     Streams are numbered by their power in each slot: the rate does not depend on their order.
@@ -158,7 +188,7 @@ def precoder_power(solution: Solution) -> "Figure":
     return figure
 
 
-def convergence(solution: Solution) -> "Figure":
+def _convergence(solution: Solution) -> "Figure":
     """Return the rate that the plan maximises, R_avg or R_del, after each iteration."""
     from matplotlib.ticker import MaxNLocator
 
@@ -172,24 +202,6 @@ def convergence(solution: Solution) -> "Figure":
     return figure
 
 
-def mission_motion(track: Track) -> "Figure":
-    """Return ground speed, m/s, and height above home, m, over time, s."""
-    return _figure(
-        _Plot("ground speed, m/s", {"": (track.t, lengths(track.velocity[:, :2]))}),
-        _Plot("height above home, m", {"": (track.t, track.position[:, 2])}),
-    )
-
-
-def energy(use: EnergyUse) -> "Figure":
-    """Return the power of the whole predicted flight, W, and what is used or left, Wh."""
-    stored = _Plot("used, Wh", {"": (use.t, use.used)})
-    if use.battery is not None:
-        full = use.battery.capacity_wh
-        reserve = {"reserve": full - use.battery.usable}
-        stored = _Plot("left, Wh", {"": (use.t, full - use.used)}, reserve)
-    return _figure(_Plot("power, W", {"": (use.t, use.power)}), stored)
-
-
 def _of_a_slot(plan: Plan) -> tuple[float, str]:
     """Return how much a bit/s/Hz is over a slot: bits per hertz, or megabytes with a bandwidth."""
     megahertz, step = plan.radio.bandwidth_mhz, plan.flight.time_step
@@ -197,7 +209,7 @@ def _of_a_slot(plan: Plan) -> tuple[float, str]:
 
 
 def _flights(
-    solution: Solution, prediction: Prediction | None, flown: Prediction | None
+    solution: Solution, prediction: Prediction | None, flown: Prediction | None = None
 ) -> dict[str, Solution | Prediction]:
     """Return those that there are by the name of their curves."""
     flights = {"planned": solution, "predicted": prediction, "flown": flown}
@@ -219,17 +231,15 @@ def _speed(solution: Solution, conversion: Conversion | None) -> _Plot:
     return _Plot("speed, m/s", curves, limits)
 
 
-def _hops(
-    solution: Solution, prediction: Prediction | None, flown: Prediction | None = None
-) -> tuple[_Plot, _Plot]:
-    """Return each link's plot: over known fading, one would hide the other."""
-    flights = _flights(solution, prediction, flown)
-    to_uav = {name: (solution.t, flight.I_U) for name, flight in flights.items()}
-    to_user = {name: (solution.t, flight.I_G) for name, flight in flights.items()}
-    return (
-        _Plot("rate to UAV, bit/s/Hz", to_uav),
-        _Plot("rate to user, bit/s/Hz", to_user),
-    )
+def _hops(solution: Solution, flights: Mapping[str, Solution | Prediction]) -> list[_Plot]:
+    """Return plots of I_U and of I_G: over known fading, one curve would hide the other."""
+    return [
+        _Plot(
+            f"rate to {end}, bit/s/Hz",
+            {name: (solution.t, getattr(flight, rate)) for name, flight in flights.items()},
+        )
+        for end, rate in (("UAV", "I_U"), ("user", "I_G"))
+    ]
 
 
 def _figure(*plots: _Plot, sharey: bool = False) -> "Figure":

@@ -7,8 +7,9 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from faao_mav.plan.yaml_text import shown
+from faao_mav.plan.yaml_text import shown as text_of
 from faao_mav.report.debrief import FromLog
+from faao_mav.report.figures import mission_figures, plan_figures
 from faao_mav.report.style import inline_svg
 from faao_mav.report.summary import Line, check_lines, result_lines
 from faao_mav.validate import Check, Finding
@@ -89,64 +90,18 @@ def _sections(about: Result | Check | FromLog) -> Iterator[str]:
         rows = [(name, f"{value:g}") for name, value in result.conversion.parameters.items()]
         told = "<p>The mission is timed for these: load them first.</p>"
         yield section("Parameters", told + _table(("parameter", "value"), rows))
-    for name, heading, figure, title in _figures(judged, check, result, log):
-        yield figure_section(name, heading, figure, title)
+    if check is not None:
+        for shown in mission_figures(check, alone=judged is not None):
+            yield figure_section(*shown)
     if result is not None:
+        for shown in plan_figures(result, log):
+            yield figure_section(*shown)
         solution = result.solution
         if len(solution.starts) > 1:
             ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
             head = ("start", f"{solution.plan.radio.maximised}, bit/s/Hz")
             yield section("Starts", _table(head, [(name, f"{rate:.4f}") for name, rate in ranked]))
-        yield section("Plan", f"<pre>{escape(shown(solution.plan.text))}</pre>", "wide text")
-
-
-def _figures(
-    judged: Check | None, check: Check | None, result: Result | None, log: FromLog | None
-) -> "Iterator[tuple[str, str, Figure, str]]":
-    """Yield name, heading, figure and title of each: of a mission by itself, and of a plan."""
-    from faao_mav.report import figures
-    from faao_mav.report.maps import mission_map
-
-    if judged is not None and (track := judged.track) is not None:
-        title = "Map of the predicted flight with the mission's items and its fence, metres"
-        yield "mission-map", "Mission", mission_map(judged.mission, track), title
-        title = "Predicted ground speed and height above home over time"
-        yield "mission-motion", "Flight", figures.mission_motion(track), title
-    if check is not None and check.energy is not None:
-        what = "energy that is used" if check.energy.battery is None else "energy that is left"
-        title = f"Power of the whole predicted flight over time, and the {what}"
-        yield "energy", "Energy", figures.energy(check.energy), title
-    if result is None:
-        return
-    solution, conversion, prediction = result.solution, result.conversion, result.prediction
-    plan, flown = solution.plan, log.found.flown if log is not None else None
-    (east, north), (to_east, to_north) = plan.flight.start, plan.flight.end
-    title = (
-        f"Map of the route from ({east:g}, {north:g}) to ({to_east:g}, {to_north:g}), east and "
-        "north in metres, coloured by speed, with stations, waypoints by item number, flights and "
-        "the fence"
-    )
-    yield "route", "Route", figures.route_figure(solution, conversion, flown), title
-    if log is not None:
-        title = "Distance from the planned place at equal times, as predicted and as flown"
-        found = log.found
-        yield "apart", "Off the plan", figures.apart(solution, found.predicted, found.flown), title
-    title = "Speed and acceleration over time, with their limits"
-    yield "motion", "Motion", figures.motion(solution, conversion), title
-    title = "Rates of both links over time"
-    yield "rates", "Link", figures.rates(solution, prediction, flown), title
-    half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
-    title = f"What the relay has received and not yet forwarded, over time{half}"
-    yield "queue", "Queue", figures.queue(solution, prediction, flown), title
-    if (under := result.shadowed) is not None:
-        title = f"What has arrived over time, as {plan.radio.maximised} counts it: planned without "
-        title += "shadowing; with it the median, and in the band eight of ten, one above, one below"
-        yield "arrival", "What arrives", figures.arrival(solution, under), title
-    first, last = solution.history[0], solution.history[-1]
-    title = f"{plan.radio.maximised} after each iteration, from {first:.4f} to {last:.4f} bit/s/Hz"
-    yield "convergence", "Convergence", figures.convergence(solution), title
-    title = "Power on each stream over time, base station and UAV, strongest stream first"
-    yield "power", "Precoders", figures.precoder_power(solution), title
+        yield section("Plan", f"<pre>{escape(text_of(solution.plan.text))}</pre>", "wide text")
 
 
 def facts(lines: Iterable[Line]) -> str:

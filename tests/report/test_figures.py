@@ -14,6 +14,7 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.shadowing import shadowed
 from faao_mav.report import figures
 from faao_mav.report.maps import mission_map
+from faao_mav.workflow import Result
 
 
 @cache
@@ -22,12 +23,13 @@ def every() -> list[Any]:
     return [
         figures.flight_figure(solution, conversion(), prediction()),
         figures.flight_figure(solution),
-        figures.route_figure(solution, conversion()),
-        figures.motion(solution, conversion()),
-        figures.rates(solution, prediction()),
-        figures.precoder_power(solution),
-        figures.convergence(solution),
+        *(shown.figure for shown in figures.plan_figures(flown())),
     ]
+
+
+def of_page(name: str, result: Result) -> Any:
+    """The axes of the figure of `name` on the page of `result`."""
+    return next(each.figure.axes for each in figures.plan_figures(result) if each.name == name)
 
 
 def lines(axes: Any) -> dict[str, Any]:
@@ -59,7 +61,7 @@ def test_axes_are_named_with_units_and_legends_hide_no_curve() -> None:
 
 def test_the_curves_are_the_flight() -> None:
     solution = flown().solution
-    speed, acceleration = figures.motion(solution, conversion()).axes
+    speed, acceleration = of_page("motion", flown())
     planned = lines(speed)["planned"]
     np.testing.assert_array_equal(planned.get_xdata(), solution.t)
     np.testing.assert_array_equal(planned.get_ydata(), np.hypot(*solution.v.T))
@@ -69,7 +71,7 @@ def test_the_curves_are_the_flight() -> None:
     assert late > 1
     over = lines(speed)["predicted"].get_xdata()[-1]
     assert over == pytest.approx(solution.t[-1] + late, abs=0.5)  # to its end
-    to_uav, to_user = figures.rates(solution, prediction()).axes
+    to_uav, to_user = of_page("rates", flown())
     np.testing.assert_array_equal(lines(to_uav)["planned"].get_ydata(), solution.I_U)
     np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), prediction().I_G)
 
@@ -81,7 +83,7 @@ def test_what_arrives_ends_at_what_the_summary_tells(causal: bool, bandwidth: fl
     solution = replace(flown().solution, problem=build_problem(plan))
     under = shadowed(solution)
     assert under is not None
-    (axes,) = figures.arrival(solution, under).axes
+    (axes,) = of_page("arrival", Result(solution, shadowed=under))
     whole = plan.flight.slots * plan.flight.time_step * (bandwidth / 8 if bandwidth else 1)
     reached = solution.delivered_rate if causal else solution.rates.R_avg
     ends = {name: line.get_ydata()[-1] / whole for name, line in lines(axes).items()}
@@ -98,7 +100,7 @@ def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen(small_plan: 
     solution = optimize(plan)
     a = solution.a.copy()
     a[0] = (240.0, 0.0)
-    _, acceleration = figures.motion(replace(solution, a=a)).axes
+    _, acceleration = of_page("motion", Result(replace(solution, a=a)))
     assert acceleration.get_ylim()[1] < 10
 
 
@@ -106,7 +108,7 @@ def test_streams_add_up_to_the_power_and_the_strongest_is_first(small_plan: Make
     changes = {"radio.csi": "instantaneous", "radio.fading_samples": 2,
                "optimizer.max_iterations": 2}  # fmt: skip
     for solution in (flown().solution, optimize(small_plan(changes))):
-        station, _ = figures.precoder_power(solution).axes
+        station, _ = of_page("power", Result(solution))
         first, second = (lines(station)[f"stream {k}"].get_ydata() for k in (1, 2))
         used = np.sum(np.abs(solution.P_B) ** 2, axis=(-2, -1))
         each_slot = used.mean(axis=0) if used.ndim == 2 else used  # averaged over the draws
