@@ -1,7 +1,6 @@
 """`faao-mission app`: the planner page."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
@@ -24,19 +23,19 @@ radio:
 
 @exit_status()
 def app(
-    plan_file: Annotated[
-        Path | None, typer.Argument(metavar="[PLAN.yaml]", help="The plan to begin with.")
-    ] = None,
-    port: Annotated[
-        int, option("N", "The port to serve at; 0: any that is free.", min=0, max=65535)
-    ] = 0,
-    host: Annotated[
-        str, option("ADDRESS", "The address to serve at; not loopback: others can reach it.")
-    ] = "127.0.0.1",
-    mbtiles: Annotated[
-        File, option("FILE", "A background map for the field: an MBTiles file of pictures.")
-    ] = None,
-    no_browser: Annotated[bool, flag("--no-browser", "Only print the address.")] = False,
+    plan_file: Path | None = typer.Argument(
+        None, metavar="[PLAN.yaml]", help="The plan to begin with."
+    ),
+    port: int = option(
+        "N", "The port to serve at; 0: any that is free.", min=0, max=65535, default=0
+    ),
+    host: str = option(
+        "ADDRESS",
+        "The address to serve at; not loopback: others can reach it.",
+        default="127.0.0.1",
+    ),
+    mbtiles: File = option("FILE", "A background map for the field: an MBTiles file of pictures."),
+    no_browser: bool = flag("--no-browser", "Only print the address."),
 ) -> None:
     """Serve the planner page: drag stations, draw zones, see the flight.
 

@@ -1,13 +1,13 @@
 """`faao-mission autopilot`: the mock autopilot."""
 
 import time
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
 from faao_mav.cli.shared import (
+    SIGNING_KEY,
     File,
-    SigningKey,
     check_known,
     exit_status,
     option,
@@ -28,41 +28,32 @@ _REST = 0.5
 
 @exit_status()
 def autopilot(
-    listen: Annotated[
-        str,
-        option(
-            "CONNECTION",
-            "Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
-            "udpout:HOST:PORT to call one.",
-        ),
-    ] = "udpin:127.0.0.1:14550",
-    kind: Annotated[
-        Literal["ardupilot", "px4"],
-        typer.Option(help="Whose manners it has."),
-    ] = "ardupilot",
-    aircraft: Annotated[
-        str, option("NAME", "What it flies: a copter, or with ardupilot a plane.", "--type")
-    ] = "copter",
-    system: Annotated[int, option("N", "Its number.", min=1, max=255)] = 1,
-    home: Annotated[
-        str, option("LAT,LON,ALT", "Where it stands: degrees, m AMSL.")
-    ] = "-35.363262,149.165237,584",
-    parameters: Annotated[
-        File, option("FILE", "Its parameters: it flies by them; without: defaults.")
-    ] = None,
-    wind: Annotated[
-        str | None, option("SPEED,FROM", "The wind that it flies in, m/s and degrees.")
-    ] = None,
-    speedup: Annotated[float, option("X", "Fly X times as fast as predicted.", min=0.01)] = 1.0,
-    boot: Annotated[float, option("S", "Boot for S seconds.", min=0)] = 0.0,
-    drop: Annotated[float, option("P", "Lose packets, both ways.", min=0, max=1)] = 0.0,
-    duplicate: Annotated[float, option("P", "Repeat packets.", min=0, max=1)] = 0.0,
-    corrupt: Annotated[float, option("P", "Damage packets.", min=0, max=1)] = 0.0,
-    delay: Annotated[
-        float, option("S", "Delay every other packet by up to S seconds.", min=0)
-    ] = 0.0,
-    seed: Annotated[int, option("N", "Of what the link does.")] = 0,
-    signing_key: SigningKey = None,
+    listen: str = option(
+        "CONNECTION",
+        "Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
+        "udpout:HOST:PORT to call one.",
+        default="udpin:127.0.0.1:14550",
+    ),
+    kind: Literal["ardupilot", "px4"] = typer.Option(
+        help="Whose manners it has.", default="ardupilot"
+    ),
+    aircraft: str = option(
+        "NAME", "What it flies: a copter, or with ardupilot a plane.", "--type", default="copter"
+    ),
+    system: int = option("N", "Its number.", min=1, max=255, default=1),
+    home: str = option(
+        "LAT,LON,ALT", "Where it stands: degrees, m AMSL.", default="-35.363262,149.165237,584"
+    ),
+    parameters: File = option("FILE", "Its parameters: it flies by them; without: defaults."),
+    wind: str | None = option("SPEED,FROM", "The wind that it flies in, m/s and degrees."),
+    speedup: float = option("X", "Fly X times as fast as predicted.", min=0.01, default=1.0),
+    boot: float = option("S", "Boot for S seconds.", min=0, default=0.0),
+    drop: float = option("P", "Lose packets, both ways.", min=0, max=1, default=0.0),
+    duplicate: float = option("P", "Repeat packets.", min=0, max=1, default=0.0),
+    corrupt: float = option("P", "Damage packets.", min=0, max=1, default=0.0),
+    delay: float = option("S", "Delay every other packet by up to S seconds.", min=0, default=0.0),
+    seed: int = option("N", "Of what the link does.", default=0),
+    signing_key: File = SIGNING_KEY,
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
 

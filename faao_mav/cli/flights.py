@@ -3,18 +3,18 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from faao_mav.cli.shared import (
+    AS_JSON,
+    PLAN_FILE,
+    RADIO,
+    SOLUTION_FILE,
+    SYSTEM,
     VEHICLE,
-    AsJson,
     File,
-    PlanFile,
-    Radio,
-    SolutionFile,
-    System,
     check_outputs,
     exit_status,
     flag,
@@ -32,23 +32,21 @@ from faao_mav.files import write_whole
 @with_link
 @exit_status()
 def fly(
-    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
-    to: Annotated[str, option("CONNECTION", VEHICLE)],
-    plan_file: PlanFile = None,
-    solution_file: SolutionFile = None,
-    arm: Annotated[bool, flag("--arm", "Arm the vehicle and start the mission.")] = False,
-    stream: Annotated[
-        bool, flag("--stream", "Fly the plan by setpoints instead of the mission; needs --arm.")
-    ] = False,
-    rate: Annotated[float, option("HZ", "Setpoints a second of --stream.", min=4, max=50)] = 10.0,
-    elsewhere: Annotated[
-        bool, flag("--elsewhere", "Arm it at another place, or height, than MISSION is made for.")
-    ] = False,
-    untimed: Annotated[
-        bool, flag("--untimed", "Arm it with other parameters than MISSION is timed for.")
-    ] = False,
-    radio: Radio = None,
-    as_json: Annotated[bool, flag("--json", "Print JSON objects, one a line.")] = False,
+    mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
+    to: str = option("CONNECTION", VEHICLE, default=...),
+    plan_file: File = PLAN_FILE,
+    solution_file: File = SOLUTION_FILE,
+    arm: bool = flag("--arm", "Arm the vehicle and start the mission."),
+    stream: bool = flag(
+        "--stream", "Fly the plan by setpoints instead of the mission; needs --arm."
+    ),
+    rate: float = option("HZ", "Setpoints a second of --stream.", min=4, max=50, default=10.0),
+    elsewhere: bool = flag(
+        "--elsewhere", "Arm it at another place, or height, than MISSION is made for."
+    ),
+    untimed: bool = flag("--untimed", "Arm it with other parameters than MISSION is timed for."),
+    radio: str | None = RADIO,
+    as_json: bool = flag("--json", "Print JSON objects, one a line."),
     *,
     link: dict[str, Any],
 ) -> None:
@@ -144,13 +142,13 @@ def fly(
 
 @exit_status()
 def debrief(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg.")],
-    plan_file: PlanFile = None,
-    solution_file: SolutionFile = None,
-    system: System = None,
-    report: Annotated[File, option("PAGE.html", "One page with all three tracks.")] = None,
-    radio: Radio = None,
-    as_json: AsJson = False,
+    log: Path = typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg."),
+    plan_file: File = PLAN_FILE,
+    solution_file: File = SOLUTION_FILE,
+    system: int | None = SYSTEM,
+    report: File = option("PAGE.html", "One page with all three tracks."),
+    radio: str | None = RADIO,
+    as_json: bool = AS_JSON,
 ) -> None:
     """Say what became of a plan, from the log of its flight.
 

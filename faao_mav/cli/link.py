@@ -6,14 +6,13 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from faao_mav.cli.shared import (
-    AsJson,
+    AS_JSON,
     File,
-    Number,
     check_outputs,
     exit_status,
     note,
@@ -33,58 +32,48 @@ if TYPE_CHECKING:
 
 @exit_status()
 def link(
-    station: Annotated[
-        str,
-        option(
-            "LAT,LON,HEIGHT",
-            "The station's antenna: degrees, and m as the altitudes, over terrain m above ground.",
-        ),
-    ],
-    logs: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="[LOG...]", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
-        ),
-    ] = None,
-    out: Annotated[File, option("LINK.yaml", "What to write: a plan's radio.gain.")] = None,
-    power: Annotated[Number, option("DBM", "What was sent, dBm; without: shape only.")] = None,
-    noise: Annotated[Number, option("DBM", "Noise of the receiver, dBm: for snr.")] = None,
-    rates: Annotated[
-        File, option("TABLE.csv", "The radio's rates, as a plan has them: for throughput.")
-    ] = None,
-    unit: Annotated[
-        list[str] | None, option("COLUMN=UNIT", "The unit of a column; may be repeated.")
-    ] = None,
-    calibrate: Annotated[
-        list[str] | None, option("COUNT=DBM", "What a device counts at a level; once or twice.")
-    ] = None,
-    mean: Annotated[
-        float, option("S", "Time over which levels are averaged, s.", min=0.1, max=60.0)
-    ] = 2.0,
-    map_file: Annotated[
-        File, option("MAP.npz", "What the law leaves of the logs, as a map above it.", "--map")
-    ] = None,
-    terrain: Annotated[
-        list[Path] | None,
-        option(
-            "DEM", "No log: heights, .hgt or GeoTIFF; may be repeated. The map is beside --out."
-        ),
-    ] = None,
-    frequency: Annotated[Number, option("MHZ", "Over terrain: the frequency.")] = None,
-    clutter: Annotated[
-        float, option("M", "Over terrain: the height of woods and houses.", min=0.0, max=200.0)
-    ] = 0.0,
-    heights: Annotated[
-        str, option("M,M", "Over terrain: heights of the map above the station's ground.")
-    ] = "40,60,80,100,120",
-    radius: Annotated[
-        float, option("M", "Over terrain: how far the map goes.", min=10.0, max=50_000.0)
-    ] = 1000.0,
-    spacing: Annotated[
-        float, option("M", "Over terrain: steps of the map.", min=1.0, max=1000.0)
-    ] = 20.0,
-    report: Annotated[File, option("PAGE.html", "Measured against fitted, on one page.")] = None,
-    as_json: AsJson = False,
+    station: str = option(
+        "LAT,LON,HEIGHT",
+        "The station's antenna: degrees, and m as the altitudes, over terrain m above ground.",
+        default=...,
+    ),
+    logs: list[Path] | None = typer.Argument(
+        None, metavar="[LOG...]", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
+    ),
+    out: File = option("LINK.yaml", "What to write: a plan's radio.gain."),
+    power: float | None = option("DBM", "What was sent, dBm; without: shape only."),
+    noise: float | None = option("DBM", "Noise of the receiver, dBm: for snr."),
+    rates: File = option("TABLE.csv", "The radio's rates, as a plan has them: for throughput."),
+    unit: list[str] | None = option("COLUMN=UNIT", "The unit of a column; may be repeated."),
+    calibrate: list[str] | None = option(
+        "COUNT=DBM", "What a device counts at a level; once or twice."
+    ),
+    mean: float = option(
+        "S", "Time over which levels are averaged, s.", min=0.1, max=60.0, default=2.0
+    ),
+    map_file: File = option(
+        "MAP.npz", "What the law leaves of the logs, as a map above it.", "--map"
+    ),
+    terrain: list[Path] | None = option(
+        "DEM", "No log: heights, .hgt or GeoTIFF; may be repeated. The map is beside --out."
+    ),
+    frequency: float | None = option("MHZ", "Over terrain: the frequency."),
+    clutter: float = option(
+        "M", "Over terrain: the height of woods and houses.", min=0.0, max=200.0, default=0.0
+    ),
+    heights: str = option(
+        "M,M",
+        "Over terrain: heights of the map above the station's ground.",
+        default="40,60,80,100,120",
+    ),
+    radius: float = option(
+        "M", "Over terrain: how far the map goes.", min=10.0, max=50_000.0, default=1000.0
+    ),
+    spacing: float = option(
+        "M", "Over terrain: steps of the map.", min=1.0, max=1000.0, default=20.0
+    ),
+    report: File = option("PAGE.html", "Measured against fitted, on one page."),
+    as_json: bool = AS_JSON,
 ) -> None:
     """Fit the law of a link's path gain to what was measured in flight, or to terrain.
 

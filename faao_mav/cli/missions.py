@@ -5,18 +5,16 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from faao_mav.cli.shared import (
-    Aircraft,
-    AsJson,
+    AS_JSON,
+    AUTOPILOT,
+    PLAN_FILE,
+    SOLUTION_FILE,
     File,
-    Number,
-    PlanFile,
-    SolutionFile,
-    Whose,
     check_known,
     check_outputs,
     exit_status,
@@ -37,36 +35,30 @@ if TYPE_CHECKING:
 
 @exit_status()
 def validate(
-    mission_file: Annotated[
-        File, typer.Argument(metavar="MISSION", help="The mission: .waypoints or .plan.")
-    ] = None,
-    plan_file: PlanFile = None,
-    solution_file: SolutionFile = None,
-    autopilot: Whose = None,
-    kind: Aircraft = None,
-    parameters: Annotated[
-        File,
-        option(
-            "FILE.param",
-            "The vehicle's parameters; without: those of the file of parameters beside MISSION, "
-            "if there is one.",
-        ),
-    ] = None,
-    max_duration: Annotated[Number, option("S", "The longest flight, seconds.")] = None,
-    max_distance: Annotated[Number, option("M", "The farthest from home, metres.")] = None,
-    max_altitude: Annotated[Number, option("M", "The highest above home, metres.")] = None,
-    wind: Annotated[
-        str | None,
-        option(
-            "SPEED,FROM",
-            "The wind to predict the flight in, m/s and degrees clockwise from north that it comes "
-            "from; without: the plan's.",
-        ),
-    ] = None,
-    report: Annotated[File, option("PAGE.html", "One page with map and findings.")] = None,
-    strict: Annotated[bool, flag("--strict", "Warnings fail as well.")] = False,
-    as_json: AsJson = False,
-    rules: Annotated[bool, flag("--rules", "List the rules and stop.")] = False,
+    mission_file: File = typer.Argument(
+        None, metavar="MISSION", help="The mission: .waypoints or .plan."
+    ),
+    plan_file: File = PLAN_FILE,
+    solution_file: File = SOLUTION_FILE,
+    autopilot: str | None = AUTOPILOT,
+    kind: str | None = option("NAME", "What flies it: copter or plane.", "--type"),
+    parameters: File = option(
+        "FILE.param",
+        "The vehicle's parameters; without: those of the file of parameters beside MISSION, "
+        "if there is one.",
+    ),
+    max_duration: float | None = option("S", "The longest flight, seconds."),
+    max_distance: float | None = option("M", "The farthest from home, metres."),
+    max_altitude: float | None = option("M", "The highest above home, metres."),
+    wind: str | None = option(
+        "SPEED,FROM",
+        "The wind to predict the flight in, m/s and degrees clockwise from north that it comes "
+        "from; without: the plan's.",
+    ),
+    report: File = option("PAGE.html", "One page with map and findings."),
+    strict: bool = flag("--strict", "Warnings fail as well."),
+    as_json: bool = AS_JSON,
+    rules: bool = flag("--rules", "List the rules and stop."),
 ) -> None:
     """Check a mission before anyone walks to the field.
 
@@ -121,12 +113,12 @@ def validate(
 
 @exit_status()
 def convert(
-    mission_file: Annotated[
-        Path, typer.Argument(metavar="MISSION", help="The mission: .waypoints, .txt or .plan.")
-    ],
-    out: Annotated[Path, option("OTHER", "What to write: .waypoints, .txt, .plan or .kml.")],
-    autopilot: Whose = None,
-    as_json: AsJson = False,
+    mission_file: Path = typer.Argument(
+        metavar="MISSION", help="The mission: .waypoints, .txt or .plan."
+    ),
+    out: Path = option("OTHER", "What to write: .waypoints, .txt, .plan or .kml.", default=...),
+    autopilot: str | None = AUTOPILOT,
+    as_json: bool = AS_JSON,
 ) -> None:
     """Write a mission in another format, and say what that cannot hold.
 

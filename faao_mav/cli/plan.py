@@ -2,15 +2,15 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from faao_mav.cli.shared import (
-    AllowArmed,
-    AsJson,
+    ALLOW_ARMED,
+    AS_JSON,
+    SYSTEM,
     File,
-    System,
     check_outputs,
     exit_status,
     flag,
@@ -29,33 +29,21 @@ if TYPE_CHECKING:
 
 @exit_status()
 def plan(
-    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
-    out: Annotated[
-        File, option("MISSION", "Write the mission: .waypoints, .txt, .plan or .kml.")
-    ] = None,
-    save: Annotated[File, option("RESULT.npz", "Write trajectory, precoders and rates.")] = None,
-    precoders: Annotated[
-        File, option("TABLE.csv", "Write the precoders by time and place.")
-    ] = None,
-    report: Annotated[File, option("FILE.html", "Write a page about the flight.")] = None,
-    figure: Annotated[File, option("FILE", "Draw the flight: .png, .svg or .pdf.")] = None,
-    upload: Annotated[
-        str | None, option("CONNECTION", "Upload the mission to a vehicle, and verify it.")
-    ] = None,
-    system: System = None,
-    allow_armed: AllowArmed = False,
-    force: Annotated[
-        bool, flag("--force", "Make the mission of a plan beyond the vehicle all the same.")
-    ] = False,
-    method: Annotated[
-        str | None, option("M", "Replace optimizer.method: direct or algorithm1.")
-    ] = None,
-    bound: Annotated[bool, flag("--bound", "Also estimate what no route can exceed.")] = False,
-    as_json: AsJson = False,
-    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
-    verbose: Annotated[
-        bool, flag("--verbose", "Print how the flight was found, and every rate.")
-    ] = False,
+    plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
+    out: File = option("MISSION", "Write the mission: .waypoints, .txt, .plan or .kml."),
+    save: File = option("RESULT.npz", "Write trajectory, precoders and rates."),
+    precoders: File = option("TABLE.csv", "Write the precoders by time and place."),
+    report: File = option("FILE.html", "Write a page about the flight."),
+    figure: File = option("FILE", "Draw the flight: .png, .svg or .pdf."),
+    upload: str | None = option("CONNECTION", "Upload the mission to a vehicle, and verify it."),
+    system: int | None = SYSTEM,
+    allow_armed: bool = ALLOW_ARMED,
+    force: bool = flag("--force", "Make the mission of a plan beyond the vehicle all the same."),
+    method: str | None = option("M", "Replace optimizer.method: direct or algorithm1."),
+    bound: bool = flag("--bound", "Also estimate what no route can exceed."),
+    as_json: bool = AS_JSON,
+    quiet: bool = flag("--quiet", "Print nothing but errors."),
+    verbose: bool = flag("--verbose", "Print how the flight was found, and every rate."),
 ) -> None:
     """Optimise a radio-relay flight and write it as a MAVLink mission.
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from functools import wraps
 from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import typer
 
@@ -23,56 +23,35 @@ if TYPE_CHECKING:
     from faao_mav.wire.link import Observe
 
 
-def option(value: str, text: str, *names: str, **limits: Any) -> Any:
+def option(value: str, text: str, *names: str, default: Any = None, **limits: Any) -> Any:
     """Return an option: what its value is called in the help, and what the option does."""
-    return typer.Option(*names, metavar=value, help=text, **limits)
+    return typer.Option(default, *names, metavar=value, help=text, **limits)
 
 
 def flag(name: str, text: str) -> Any:
     """Return an option without a value: its name, and what it does."""
-    return typer.Option(name, help=text)
+    return typer.Option(False, name, help=text)
 
 
 VEHICLE = "The vehicle: udpout:HOST:PORT, udpin:HOST:PORT, tcp:HOST:PORT or DEVICE,BAUD."
 """The help of an option for a vehicle's connection."""
 
-Number: TypeAlias = float | None
 File: TypeAlias = Path | None
-System: TypeAlias = Annotated[
-    int | None, option("N", "The vehicle's system number.", min=1, max=255)
-]
-AllowArmed: TypeAlias = Annotated[
-    bool, flag("--allow-armed", "Replace the mission of an armed vehicle too.")
-]
-Radio: TypeAlias = Annotated[
-    str | None, option("udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines.")
-]
-SigningKey: TypeAlias = Annotated[
-    File, option("F", "File with the key for signed packets: 32 bytes, or in hex.")
-]
-Whose: TypeAlias = Annotated[
-    str | None, option("NAME", "Whose mission it is: ardupilot or px4.", "--autopilot")
-]
-Aircraft: TypeAlias = Annotated[
-    str | None, option("NAME", "What flies it: copter or plane.", "--type")
-]
-PlanFile: TypeAlias = Annotated[
-    File,
-    option(
-        "PLAN.yaml",
-        "The plan: its vehicle, its limits, and the link that it is to deliver.",
-        "--plan",
-    ),
-]
-SolutionFile: TypeAlias = Annotated[
-    File,
-    option(
-        "RESULT.npz",
-        "Instead of --plan: what --save wrote, with the plan in it, already solved.",
-        "--solution",
-    ),
-]
-AsJson: TypeAlias = Annotated[bool, flag("--json", "Print one JSON object instead of the text.")]
+
+SYSTEM = option("N", "The vehicle's system number.", min=1, max=255)
+ALLOW_ARMED = flag("--allow-armed", "Replace the mission of an armed vehicle too.")
+RADIO = option("udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines.")
+SIGNING_KEY = option("F", "File with the key for signed packets: 32 bytes, or in hex.")
+AUTOPILOT = option("NAME", "Whose mission it is: ardupilot or px4.", "--autopilot")
+PLAN_FILE = option(
+    "PLAN.yaml", "The plan: its vehicle, its limits, and the link that it is to deliver.", "--plan"
+)
+SOLUTION_FILE = option(
+    "RESULT.npz",
+    "Instead of --plan: what --save wrote, with the plan in it, already solved.",
+    "--solution",
+)
+AS_JSON = flag("--json", "Print one JSON object instead of the text.")
 
 
 @contextmanager
@@ -95,18 +74,16 @@ def with_link(command: Callable[..., None]) -> Callable[..., None]:
     """
 
     def options(
-        system: System = None,
-        component: Annotated[
-            int | None, option("N", "The autopilot's component number.", min=1, max=255)
-        ] = None,
-        own_system: Annotated[
-            int | None, option("N", "The system number to speak as; without: 246.", min=1, max=255)
-        ] = None,
-        log: Annotated[File, option("F.tlog", "Write a log of the exchange.")] = None,
-        wait: Annotated[
-            float, option("S", "How long to wait for the vehicle, s.", "--timeout", min=0.1)
-        ] = 10.0,
-        signing_key: SigningKey = None,
+        system: int | None = SYSTEM,
+        component: int | None = option("N", "The autopilot's component number.", min=1, max=255),
+        own_system: int | None = option(
+            "N", "The system number to speak as; without: 246.", min=1, max=255
+        ),
+        log: File = option("F.tlog", "Write a log of the exchange."),
+        wait: float = option(
+            "S", "How long to wait for the vehicle, s.", "--timeout", min=0.1, default=10.0
+        ),
+        signing_key: File = SIGNING_KEY,
     ) -> dict[str, Any]:
         return locals() | {"note": note}
 

@@ -4,11 +4,11 @@ import itertools
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from faao_mav.cli.shared import AsJson, File, exit_status, note, option, progress, show
+from faao_mav.cli.shared import AS_JSON, File, exit_status, note, option, progress, show
 from faao_mav.errors import InputError, PlanError
 
 if TYPE_CHECKING:
@@ -21,32 +21,19 @@ _INTERRUPTED = 130
 
 @exit_status()
 def study(
-    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.yaml", help="The plan.")],
-    vary: Annotated[
-        list[str] | None, option("KEY=VALUES", "start:stop:step or a,b,c; several make a grid.")
-    ] = None,
-    power: Annotated[str | None, option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c.")] = None,
-    schemes: Annotated[
-        str | None, option("S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian.")
-    ] = None,
-    seeds: Annotated[
-        int | None, option("N", "Draws of the fading, from radio.seed.", min=1)
-    ] = None,
-    frontier: Annotated[
-        str | None,
-        option("AXIS,data", "The most data for every AXIS: duration, power or energy."),
-    ] = None,
-    points: Annotated[
-        int | None, option("N", "Points of the frontier; without it 12.", min=2)
-    ] = None,
-    jobs: Annotated[int, option("N", "Processes; -1: one a core.")] = -1,
-    cluster: Annotated[
-        str | None, option("ADDRESS", "A Dask scheduler, tcp://host:port, not processes.")
-    ] = None,
-    out: Annotated[
-        File, option("DIR", "Keep rows there as they finish; go on where it ended.")
-    ] = None,
-    as_json: AsJson = False,
+    plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
+    vary: list[str] | None = option("KEY=VALUES", "start:stop:step or a,b,c; several make a grid."),
+    power: str | None = option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c."),
+    schemes: str | None = option("S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian."),
+    seeds: int | None = option("N", "Draws of the fading, from radio.seed.", min=1),
+    frontier: str | None = option(
+        "AXIS,data", "The most data for every AXIS: duration, power or energy."
+    ),
+    points: int | None = option("N", "Points of the frontier; without it 12.", min=2),
+    jobs: int = option("N", "Processes; -1: one a core.", default=-1),
+    cluster: str | None = option("ADDRESS", "A Dask scheduler, tcp://host:port, not processes."),
+    out: File = option("DIR", "Keep rows there as they finish; go on where it ended."),
+    as_json: bool = AS_JSON,
 ) -> None:
     """Optimise a plan with many values, schemes and seeds, and compare.
 

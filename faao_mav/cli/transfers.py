@@ -3,14 +3,14 @@
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from faao_mav.cli.shared import (
+    ALLOW_ARMED,
+    AS_JSON,
     VEHICLE,
-    AllowArmed,
-    AsJson,
     File,
     check_outputs,
     exit_status,
@@ -32,17 +32,16 @@ if TYPE_CHECKING:
 @with_link
 @exit_status()
 def upload(
-    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="The mission file.")],
-    to: Annotated[str, option("CONNECTION", VEHICLE)],
-    parameters: Annotated[
-        File,
-        option("FILE", "Set the parameters that MISSION is timed for, first, and read them back."),
-    ] = None,
-    clear_rest: Annotated[
-        bool, flag("--clear-rest", "Clear a fence and rally points that MISSION does not have.")
-    ] = False,
-    as_json: AsJson = False,
-    allow_armed: AllowArmed = False,
+    mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
+    to: str = option("CONNECTION", VEHICLE, default=...),
+    parameters: File = option(
+        "FILE", "Set the parameters that MISSION is timed for, first, and read them back."
+    ),
+    clear_rest: bool = flag(
+        "--clear-rest", "Clear a fence and rally points that MISSION does not have."
+    ),
+    as_json: bool = AS_JSON,
+    allow_armed: bool = ALLOW_ARMED,
     *,
     link: dict[str, Any],
 ) -> None:
@@ -130,8 +129,8 @@ def _plain(value: Any) -> Any:
 @with_link
 @exit_status()
 def download(
-    source: Annotated[str, option("CONNECTION", VEHICLE, "--from")],
-    out: Annotated[Path, option("MISSION", "Write the mission.")],
+    source: str = option("CONNECTION", VEHICLE, "--from", default=...),
+    out: Path = option("MISSION", "Write the mission.", default=...),
     *,
     link: dict[str, Any],
 ) -> None:
