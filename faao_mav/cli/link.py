@@ -26,8 +26,8 @@ from faao_mav.files import check_ending, read_text, write_together, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
-    from faao_mav.radio.gain_map import GainMap
     from faao_mav.radio.measured import Calibration
+    from faao_mav.report.link import LinkReport
 
 
 @exit_status()
@@ -120,63 +120,43 @@ def link(
     check_outputs({"--out": out, "--map": map_file, "--report": report}, inputs)
     if bool(logs) == bool(terrain):
         raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
+    written = []
     if terrain:
         if report is not None:
             raise InputError("--report: is about logs; leave it out with --terrain")
-        size = clutter, radius, spacing
-        _over_terrain(terrain, place, frequency, heights, size, out, map_file, as_json)
-        return
-    from faao_mav.radio.fit import fit_link
-    from faao_mav.report.link import link_lines, link_page, link_record, link_yaml, map_text
+        found = _over_terrain(terrain, place, frequency, heights, (clutter, radius, spacing))
+    else:
+        from faao_mav.radio.fit import fit_link
+        from faao_mav.report.link import fitted, link_page
+
+        flights = [
+            each
+            for path in logs or ()
+            for each in _gains(path, place, units, points, rates, power, noise)
+        ]
+        fit = fit_link(flights, mean)
+        found = fitted(fit, power is not None, place if map_file is not None else None)
+        if report is not None:
+            write_whole(report, link_page(fit, found).encode())
+            written.append(str(report))
+    if out is not None and found.law:
+        contents: dict[str | Path, bytes] = {out: found.law.encode()}
+        if found.above is not None and map_file is not None:
+            from faao_mav.radio.map_file import map_archive
+
+            name = json.dumps(os.path.relpath(map_file, out.parent))
+            contents = {map_file: map_archive(found.above), out: f"{found.law}map: {name}\n".encode()}
+        write_together(contents)
+        written = [*map(str, reversed(contents)), *written]
     from faao_mav.report.summary import joined
 
-    sent = power or 0.0
-    flights: list[Samples] = []
-    for path in logs or ():
-        for samples, told in _flights(path, place, units, points):
-            if told == "mbit/s":
-                samples, told = _by_rates(path, samples, rates), "db"
-            if told == "db" and (power is None) != (noise is None):
-                raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
-            floor = noise or 0.0 if told == "db" else 0.0
-            flights.append(replace(samples, level=samples.level + floor - sent))
-    absolute = power is not None
-    fit = fit_link(flights, mean)
-    if report is not None:
-        write_whole(report, link_page(fit, absolute).encode())
-    lines, record = [*link_lines(fit, absolute)], link_record(fit, absolute)
-    found = None
-    if map_file is not None and fit.holds:
-        from faao_mav.radio.kriging import kriged
-
-        found, alone, error = kriged(fit, place)
-        fit = replace(fit, spread=fit.spread if found is None else error)
-        lines.append(("map", map_text(found, alone, error)))
-        record |= {"left_out_db": alone, "left_out_map_db": error}
-    written = [str(report)] if report is not None else []
-    if fit.holds:
-        written = [*_written(link_yaml(fit, absolute), out, found, map_file), *written]
     show(
-        lambda: record | {"written": written},
-        lambda: [joined([*lines, ("files", ", ".join(written) or "none")])],
+        lambda: found.record | {"written": written},
+        lambda: [joined([*found.lines, ("files", ", ".join(written) or "none")])],
         as_json=as_json,
     )
-    if not fit.holds:
+    if not found.law:
         raise typer.Exit(1)
-
-
-def _written(text: str, out: Path | None, found: "GainMap | None", map_file: File) -> list[str]:
-    """Write the law `text`, which names its map, and that; return their names."""
-    from faao_mav.radio.map_file import map_archive
-
-    if out is None:
-        return []
-    if found is None or map_file is None:
-        write_whole(out, text.encode())
-        return [str(out)]
-    name = json.dumps(os.path.relpath(map_file, out.parent))
-    write_together({map_file: map_archive(found), out: f"{text}map: {name}\n".encode()})
-    return [str(out), str(map_file)]
 
 
 def _over_terrain(
@@ -185,11 +165,8 @@ def _over_terrain(
     frequency: float | None,
     heights: str,
     size: tuple[float, float, float],
-    out: Path | None,
-    map_file: Path | None,
-    as_json: bool,
-) -> None:
-    """Write and tell free space, and the map of what terrain takes above it."""
+) -> "LinkReport":
+    """Return free space and the map of what terrain takes above it; `size` as `terrain_map`."""
     if frequency is None or not 30 <= frequency <= 100_000:
         raise InputError("--frequency: expected MHz, 30 to 100000, for --terrain")
     wanted = f"--heights {heights}: expected metres that rise, as 40,60,80"
@@ -197,8 +174,7 @@ def _over_terrain(
     if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= 20_000:
         raise InputError(wanted)
     from faao_mav.radio.terrain import read_terrain, terrain_map
-    from faao_mav.report.link import terrain_lines, terrain_record, terrain_yaml
-    from faao_mav.report.summary import joined
+    from faao_mav.report.link import over_terrain
 
     rasters = []
     for path in paths:
@@ -208,11 +184,26 @@ def _over_terrain(
             note(f"{path}: {unknown:,} heights are not known and taken from the nearest that are")
     with progress(shown=sys.stderr.isatty()) as observe:
         found = terrain_map(rasters, station, 1e6 * frequency, levels, *size, observe)
-    names = ", ".join(path.name for path in paths)
-    written = _written(terrain_yaml(frequency, names), out, found, map_file)
-    lines = [*terrain_lines(found, frequency), ("files", ", ".join(written) or "none")]
-    record = terrain_record(found, frequency) | {"written": written}
-    show(lambda: record, lambda: [joined(lines)], as_json=as_json)
+    return over_terrain(found, frequency, ", ".join(path.name for path in paths))
+
+
+def _gains(
+    path: Path,
+    station: Sequence[float],
+    units: Mapping[str, str],
+    calibration: "Calibration",
+    rates: Path | None,
+    power: float | None,
+    noise: float | None,
+) -> "Iterator[Samples]":
+    """Yield the gain, dB, in each flight of a table or log; without a `power` within a constant."""
+    for samples, unit in _flights(path, station, units, calibration):
+        if unit == "mbit/s":
+            samples, unit = _by_rates(path, samples, rates), "db"
+        if unit == "db" and (power is None) != (noise is None):
+            raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
+        floor = noise or 0.0 if unit == "db" else 0.0
+        yield replace(samples, level=samples.level + floor - (power or 0.0))
 
 
 def _flights(

@@ -63,19 +63,8 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (
-    plan,
-    validate,
-    upload,
-    download,
-    fly,
-    debrief,
-    link,
-    convert,
-    autopilot,
-    study,
-    page,
-):
+COMMANDS = (plan, validate, upload, download, fly, debrief, link, convert, autopilot, study, page)
+for command in COMMANDS:
     app.command(command.__name__)(command)
 
 
