@@ -132,7 +132,7 @@ WAITING = (
     ("app.guard", {"nicegui", "scipy", "pyproj"}),
     ("app.document", {"nicegui", "scipy", "pyproj"}),
     ("wire.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
-    ("app.planner", {"nicegui", "cvxpy", "pymavlink"}),
+    ("app.workers", {"nicegui", "cvxpy", "pymavlink"}),
     ("app.vehicle", {"nicegui", "cvxpy", "pymavlink"}),
 )
 """Modules in an order in which one process can import them, and what is absent after each."""

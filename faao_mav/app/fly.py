@@ -9,9 +9,8 @@ from typing import Any
 
 from nicegui import events, ui
 
-from faao_mav.app.planner import said
 from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watched
-from faao_mav.app.workers import Workers, talk
+from faao_mav.app.workers import Workers, said, talk
 from faao_mav.fly.telling import as_text
 from faao_mav.workflow import Result
 

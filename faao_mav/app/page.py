@@ -10,16 +10,13 @@ import nicegui
 import numpy as np
 from nicegui import events, ui
 
-from faao_mav.app.answers import FILES, Answer, made
-from faao_mav.app.charts import heights
+from faao_mav.app.answers import FILES, Answer, heights, made
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.fly import Fly
 from faao_mav.app.guard import TILES
 from faao_mav.app.panels import Form, Results, fields
-from faao_mav.app.planner import Planner
 from faao_mav.app.scene import STATIONS, Scene
-from faao_mav.app.tiles import OPEN_STREET_MAP
-from faao_mav.app.workers import Workers
+from faao_mav.app.workers import Planner, Workers
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.plan.yaml_text import MAX_CHARACTERS
 
@@ -124,7 +121,7 @@ class Page:
             _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
             _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
             shown = ui.switch("Background", on_change=self._show_background)
-            if self._background is OPEN_STREET_MAP:
+            if self._background["url"].startswith(TILES):
                 shown.tooltip("OpenStreetMap: the parts of the map that you look at are asked for "
                               f"from {TILES.removeprefix('https://')}")  # fmt: skip
         self._map.move(target_index=-1)

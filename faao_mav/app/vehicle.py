@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.app.charts import thinned
+from faao_mav.app.answers import thinned
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.report.summary import joined
 from faao_mav.schedule.conversion import Conversion, beyond_vehicle

@@ -51,8 +51,7 @@ def app(
 
     begin()  # what is no plan is refused at once
     check_extra("app", "nicegui", "the planner page")
-    from faao_mav.app.serve import serve
-    from faao_mav.app.tiles import TileFile
+    from faao_mav.app.serve import TileFile, serve
 
     tiles = None if mbtiles is None else TileFile(mbtiles)
     serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=note)

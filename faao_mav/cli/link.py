@@ -145,7 +145,10 @@ def link(
             from faao_mav.radio.map_file import map_archive
 
             name = json.dumps(os.path.relpath(map_file, out.parent))
-            contents = {map_file: map_archive(found.above), out: f"{found.law}map: {name}\n".encode()}
+            contents = {
+                map_file: map_archive(found.above),
+                out: f"{found.law}map: {name}\n".encode(),
+            }
         write_together(contents)
         written = [*map(str, reversed(contents)), *written]
     from faao_mav.report.summary import joined

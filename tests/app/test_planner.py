@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from conftest import FLYABLE, edited
 
-from faao_mav.app import answers, planner
+from faao_mav.app import answers, workers
 from faao_mav.app.answers import Answer
-from faao_mav.app.planner import Planner
-from faao_mav.app.workers import Workers
+from faao_mav.app.workers import Planner, Workers
 from faao_mav.errors import FaaoError
 
 
@@ -42,7 +41,7 @@ class Held:
 def test_the_last_question_wins_and_what_goes_wrong_is_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(planner, "_REST", 0.0)
+    monkeypatch.setattr(workers, "_REST", 0.0)
     held, shown = Held(), list[str]()
 
     async def script() -> None:
@@ -75,22 +74,22 @@ def test_the_last_question_wins_and_what_goes_wrong_is_told(
 
 def test_a_long_job_ends_with_its_wait_and_its_death_is_told() -> None:
     async def run() -> None:
-        workers = Workers()
+        own = Workers()
         try:
-            workers._free = asyncio.Semaphore(1)
-            stale = asyncio.create_task(workers.long(time.sleep, 3600))
+            own._free = asyncio.Semaphore(1)
+            stale = asyncio.create_task(own.long(time.sleep, 3600))
             await asyncio.sleep(0)
             stale.cancel()
-            assert await workers.long(os.path.join, "a", "b") == "a/b"
+            assert await own.long(os.path.join, "a", "b") == "a/b"
             with pytest.raises(FaaoError, match="has ended"):
-                await workers.long(os._exit, 3)
+                await own.long(os._exit, 3)
             with pytest.raises(ZeroDivisionError):
-                await workers.long(divmod, 1, 0)
+                await own.long(divmod, 1, 0)
             with pytest.raises(FaaoError, match="has ended"):
-                await workers.short(os._exit, 3)
-            assert await workers.short(partial(max, 1), 2) == 2
+                await own.short(os._exit, 3)
+            assert await own.short(partial(max, 1), 2) == 2
         finally:
-            workers.stop()
+            own.stop()
 
     asyncio.run(run())
 

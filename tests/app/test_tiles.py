@@ -4,9 +4,11 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
-from faao_mav.app.tiles import TileFile
+pytest.importorskip("nicegui", reason="the extra app is not installed")
+from faao_mav.app.serve import TileFile
 from faao_mav.cli.main import app
 
 SCHEMA = """CREATE TABLE metadata (name text, value text);
