@@ -1,6 +1,5 @@
 """`faao-mission autopilot`: the mock autopilot."""
 
-import time
 from typing import TYPE_CHECKING, Literal
 
 import typer
@@ -17,13 +16,12 @@ from faao_mav.cli.shared import (
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from faao_mav.sim import MockAutopilot
 
 _HIGHEST = 100_000.0
 """The greatest altitude of a home, m: chosen, where space begins; the wire carries millimetres."""
-
-_REST = 0.5
-"""Seconds without a change after which a list is told; chosen: longer than between two items."""
 
 
 @exit_status()
@@ -102,38 +100,25 @@ def autopilot(
     key = None if signing_key is None else read_signing(signing_key).key
     transport = open_transport(listen)
     typer.echo(f"{kind}, system {system}, at {listen}; Ctrl-C ends")
-    diary = Diary()
     try:
-        serve(mock, transport, faults=faults, key=key, observe=diary)
+        serve(mock, transport, faults=faults, key=key, observe=_diary())
     except KeyboardInterrupt:
-        diary.tell()
         typer.echo("ended")
 
 
-class Diary:
-    """Tells what changes on a mock autopilot once nothing has changed for a while."""
+def _diary() -> "Callable[[MockAutopilot], None]":
+    """Return what prints, whenever it is called, what has changed on a mock autopilot."""
+    from faao_mav.wire.protocol import MissionType
 
-    def __init__(self) -> None:
-        self._told: dict[str, object] = {}
-        self._seen: dict[str, object] = {}
-        self._changed = 0.0
+    told: dict[str, object] = {}
 
-    def __call__(self, mock: "MockAutopilot") -> None:
-        """Print what has come to rest since the last call."""
-        from faao_mav.wire.protocol import MissionType
-
+    def observe(mock: "MockAutopilot") -> None:
         now: dict[str, object] = {part.title: mock.lists.items(part) for part in MissionType}
         now["armed"] = mock.armed
-        self._told = self._told or now
-        if now != self._seen:
-            self._seen, self._changed = now, time.monotonic()
-        elif time.monotonic() > self._changed + _REST:
-            self.tell()
-
-    def tell(self) -> None:
-        """Print what has been seen and not told."""
-        for name, value in self._seen.items():
-            if value != self._told[name]:
+        for name, value in now.items():
+            if value != told.setdefault(name, value):
                 rows = f"{name}: {len(value)} rows" if isinstance(value, tuple) else ""
                 typer.echo(rows or ("armed" if value else "disarmed"))
-        self._told = self._seen
+        told.update(now)
+
+    return observe
