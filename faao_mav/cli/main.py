@@ -13,12 +13,12 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from faao_mav.cli.app import app as page
-from faao_mav.cli.autopilot import autopilot
 from faao_mav.cli.flights import debrief, fly
 from faao_mav.cli.link import link
 from faao_mav.cli.missions import convert, validate
 from faao_mav.cli.plan import plan
+from faao_mav.cli.serving import app as page
+from faao_mav.cli.serving import autopilot
 from faao_mav.cli.shared import note
 from faao_mav.cli.study import study
 from faao_mav.cli.transfers import download, upload

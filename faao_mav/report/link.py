@@ -14,7 +14,7 @@ from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, seen
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.kriging import kriged
 from faao_mav.radio.terrain import free_space_db
-from faao_mav.report.style import INK, SERIES, WIDTH, drawing, label, legend_above
+from faao_mav.report.style import INK, SERIES, WIDTH, colour_bar, drawing, label, legend_above
 from faao_mav.report.summary import Line
 
 if TYPE_CHECKING:
@@ -232,9 +232,6 @@ def _map(place: Real, residual: Real) -> "Figure":
         plot.plot([0], [0], "s", color=INK, markersize=7)
         plot.annotate("station", (0, 0), xytext=(7, 7), textcoords="offset points", color=INK)
         plot.set_aspect("equal", adjustable="datalim")
-        bar = figure.colorbar(shown, ax=plot, shrink=0.8)
-        bar.set_label("measured over fitted, dB")
-        if bar.solids is not None:
-            bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
+        colour_bar(plot, shown, "measured over fitted, dB", 0.8)
         label(plot, "", "east, m", "north, m")
     return figure

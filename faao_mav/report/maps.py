@@ -21,6 +21,7 @@ from faao_mav.report.style import (
     SERIES,
     SPEEDS,
     WIDTH,
+    colour_bar,
     drawing,
     label,
     legend_above,
@@ -154,11 +155,7 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     lines.set_array(means)
     lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
     plot.add_collection(lines)
-    figure = plot.get_figure()
-    assert figure is not None
-    bar = figure.colorbar(lines, ax=plot, label="planned speed, m/s", shrink=0.7)
-    if bar.solids is not None:
-        bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
+    colour_bar(plot, lines, "planned speed, m/s", 0.7)
 
 
 def _draw_items(

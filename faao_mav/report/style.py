@@ -22,6 +22,7 @@ from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
 INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
@@ -105,10 +106,9 @@ def drawing(width: float, height: float) -> Iterator["Figure"]:
 
 
 def label(axes: "Axes", title: str, x: str, y: str) -> None:
-    """Name a plot and its axes."""
-    axes.set_title(_plain(title))
-    axes.set_xlabel(_plain(x))
-    axes.set_ylabel(_plain(y))
+    """Name a plot and its axes: a plan's names are no formulas."""
+    plain = [text.replace("$", r"\$") for text in (title, x, y)]
+    axes.set(title=plain[0], xlabel=plain[1], ylabel=plain[2])
 
 
 def legend_above(axes: "Axes", columns: int = 4) -> None:
@@ -129,9 +129,13 @@ def legend_above(axes: "Axes", columns: int = 4) -> None:
     )
 
 
-def _plain(text: str) -> str:
-    """Keep matplotlib from reading formulas into a plan's names."""
-    return text.replace("$", r"\$")
+def colour_bar(axes: "Axes", colours: "ScalarMappable", text: str, shrink: float) -> None:
+    """Put the scale of `colours`, named `text`, beside a plot."""
+    figure = axes.get_figure()
+    assert figure is not None
+    bar = figure.colorbar(colours, ax=axes, label=text, shrink=shrink)
+    if bar.solids is not None:
+        bar.solids.set_edgecolor("face")  # else hairlines of paper between the shades
 
 
 def mark_stations(

@@ -13,7 +13,7 @@ from served import running, vehicle
 from stations import FENCE, HOME, RALLY, a_mission, hurry, vehicle_of
 from typer.testing import CliRunner, Result
 
-from faao_mav.cli.autopilot import autopilot
+from faao_mav.cli.serving import autopilot
 from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
