@@ -16,7 +16,6 @@ from faao_mav.cli.shared import (
     VEHICLE,
     File,
     check_outputs,
-    exit_status,
     flag,
     note,
     option,
@@ -30,7 +29,6 @@ from faao_mav.files import write_whole
 
 
 @with_link
-@exit_status()
 def fly(
     mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
     to: str = option("CONNECTION", VEHICLE, default=...),
@@ -140,7 +138,6 @@ def fly(
         raise typer.Exit(1)
 
 
-@exit_status()
 def debrief(
     log: Path = typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg."),
     plan_file: File = PLAN_FILE,

@@ -14,7 +14,6 @@ from faao_mav.cli.shared import (
     AS_JSON,
     File,
     check_outputs,
-    exit_status,
     note,
     option,
     progress,
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from faao_mav.report.link import LinkReport
 
 
-@exit_status()
 def link(
     station: str = option(
         "LAT,LON,HEIGHT",

@@ -6,7 +6,6 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from faao_mav.cli.missions import convert, validate
 from faao_mav.cli.plan import plan
 from faao_mav.cli.serving import app as page
 from faao_mav.cli.serving import autopilot
-from faao_mav.cli.shared import note
+from faao_mav.cli.shared import exit_status, note
 from faao_mav.cli.study import study
 from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import HangUp
@@ -65,7 +64,7 @@ app = typer.Typer(
 )
 COMMANDS = (plan, validate, upload, download, fly, debrief, link, convert, autopilot, study, page)
 for command in COMMANDS:
-    app.command(command.__name__)(command)
+    app.command(command.__name__)(exit_status()(command))
 
 
 def _version(asked: bool) -> None:
@@ -105,11 +104,7 @@ def run() -> None:
     keyboard does: a transfer is cancelled. So does SIGHUP, unless it is ignored, but a mission that
     is under way is left alone: the terminal has gone.
     """
-    handlers: dict[str, Callable[..., object]] = {
-        "SIGTERM": signal.default_int_handler,
-        "SIGHUP": _hang_up,
-    }
-    for name, handler in handlers.items():
+    for name, handler in (("SIGTERM", signal.default_int_handler), ("SIGHUP", _hang_up)):
         number = getattr(signal, name, signal.SIGTERM)
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, handler)

@@ -17,7 +17,6 @@ from faao_mav.cli.shared import (
     File,
     check_known,
     check_outputs,
-    exit_status,
     flag,
     option,
     planned,
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from faao_mav.validate import Check, Level, Rule
 
 
-@exit_status()
 def validate(
     mission_file: File = typer.Argument(
         None, metavar="MISSION", help="The mission: .waypoints or .plan."
@@ -111,7 +109,6 @@ def validate(
         raise typer.Exit(1)
 
 
-@exit_status()
 def convert(
     mission_file: Path = typer.Argument(
         metavar="MISSION", help="The mission: .waypoints, .txt or .plan."

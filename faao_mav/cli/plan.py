@@ -12,7 +12,6 @@ from faao_mav.cli.shared import (
     SYSTEM,
     File,
     check_outputs,
-    exit_status,
     flag,
     note,
     optimizer_progress,
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from faao_mav.workflow import Result
 
 
-@exit_status()
 def plan(
     plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
     out: File = option("MISSION", "Write the mission: .waypoints, .txt, .plan or .kml."),

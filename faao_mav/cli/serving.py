@@ -9,7 +9,6 @@ from faao_mav.cli.shared import (
     SIGNING_KEY,
     File,
     check_known,
-    exit_status,
     flag,
     note,
     option,
@@ -41,7 +40,6 @@ _HIGHEST = 100_000.0
 """The greatest altitude of a home, m: chosen, where space begins; the wire carries millimetres."""
 
 
-@exit_status()
 def app(
     plan_file: Path | None = typer.Argument(
         None, metavar="[PLAN.yaml]", help="The plan to begin with."
@@ -77,7 +75,6 @@ def app(
     serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=note)
 
 
-@exit_status()
 def autopilot(
     listen: str = option(
         "CONNECTION",

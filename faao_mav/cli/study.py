@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from faao_mav.cli.shared import AS_JSON, File, exit_status, note, option, progress, show
+from faao_mav.cli.shared import AS_JSON, File, note, option, progress, show
 from faao_mav.errors import InputError, PlanError
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ _INTERRUPTED = 130
 """The exit status of an interrupted study, as a shell reports SIGINT: 128 + 2."""
 
 
-@exit_status()
 def study(
     plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
     vary: list[str] | None = option("KEY=VALUES", "start:stop:step or a,b,c; several make a grid."),

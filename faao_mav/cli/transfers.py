@@ -13,7 +13,6 @@ from faao_mav.cli.shared import (
     VEHICLE,
     File,
     check_outputs,
-    exit_status,
     flag,
     note,
     option,
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 
 
 @with_link
-@exit_status()
 def upload(
     mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
     to: str = option("CONNECTION", VEHICLE, default=...),
@@ -127,7 +125,6 @@ def _plain(value: Any) -> Any:
 
 
 @with_link
-@exit_status()
 def download(
     source: str = option("CONNECTION", VEHICLE, "--from", default=...),
     out: Path = option("MISSION", "Write the mission.", default=...),

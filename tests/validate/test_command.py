@@ -9,7 +9,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-import typer
 from conftest import MISSIONS
 from judged import given, track
 from typer.testing import CliRunner
@@ -17,8 +16,7 @@ from typer.testing import CliRunner
 import faao_mav
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import plan_target
-from faao_mav.cli.main import app as main
-from faao_mav.cli.missions import validate
+from faao_mav.cli.main import app
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.formats import read_mission, render_mission
 from faao_mav.mission.item import Mission
@@ -36,8 +34,6 @@ LEVEL = track(((0, 0, 0), (0, 0, 30), (0, 100, 30)), [0, 2], 8.0)
 @pytest.fixture
 def run(monkeypatch: pytest.MonkeyPatch) -> Run:
     """Run the command with a prediction that is always the same, or none."""
-    app = typer.Typer()
-    app.command()(validate)
 
     def runner(*arguments: object, predicted: bool = False) -> Any:
         def predict(mission: Mission, vehicle: Vehicle, **_: object) -> object:
@@ -47,7 +43,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Run:
 
         fake = SimpleNamespace(predict=predict)
         monkeypatch.setitem(sys.modules, "faao_mav.autopilot.predict", fake)
-        return CliRunner().invoke(app, [str(argument) for argument in arguments])
+        return CliRunner().invoke(app, ["validate", *(str(argument) for argument in arguments)])
 
     return runner
 
@@ -72,9 +68,8 @@ def sound(write: Callable[..., Path]) -> Path:
 
 
 def test_nothing_wrong(run: Run, sound: Path) -> None:
-    app = typer.Typer()
-    app.command()(validate)
-    told = CliRunner().invoke(app, [str(sound), "--autopilot", "px4", "--type", "plane"]).stdout
+    asked = ["validate", str(sound), "--autopilot", "px4", "--type", "plane"]
+    told = CliRunner().invoke(app, asked).stdout
     assert "flight not predicted: there is no model of how PX4 flies planes" in told
     found = faao_mav.check(read_mission(sound), Vehicle(), limits=faao_mav.Limits(max_altitude=20))
     assert isinstance(found.findings[0], faao_mav.Finding)
@@ -158,7 +153,7 @@ def test_a_mission_is_validated_in_a_wind(write: Callable[..., Path]) -> None:
     path = str(write("takeoff change_speed=1,8,-1 waypoint:0,300,30 waypoint:0,0,30 land"))
 
     def told(*options: str) -> str:
-        return CliRunner().invoke(main, ["validate", path, *options]).output
+        return CliRunner().invoke(app, ["validate", path, *options]).output
 
     slow, quick = (
         json.loads(told("--json", *wind))["predicted"]["duration"]

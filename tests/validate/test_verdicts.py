@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 from judged import HOME
 from typer.testing import CliRunner
 
 from faao_mav.autopilot import Vehicle
-from faao_mav.cli.missions import validate as command
+from faao_mav.cli.main import app
 from faao_mav.errors import MissionFileError
 from faao_mav.mission.fence import Fence, Polygon
 from faao_mav.mission.formats import read_mission, read_mission_file
@@ -41,10 +40,8 @@ def test_the_table_is_about_the_files() -> None:
 def test_each_file_gets_its_errors_and_warnings(row: list[str]) -> None:
     """Also on the command line, which predicts the flight, and never shows a traceback."""
     name, autopilot, kind, parameters, expected = row
-    app = typer.Typer()
-    app.command()(command)
     told = ["--autopilot", autopilot, "--type", kind, "--json"]
-    run = CliRunner().invoke(app, [str(CORPUS / name), *told])
+    run = CliRunner().invoke(app, ["validate", str(CORPUS / name), *told])
     assert isinstance(run.exception, SystemExit | None)
     if expected == "unreadable":
         assert run.exit_code == 2

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 from conftest import free_port
 from served import running, vehicle
 from stations import FENCE, HOME, RALLY, a_mission, hurry, vehicle_of
 from typer.testing import CliRunner, Result
 
-from faao_mav.cli.serving import autopilot
-from faao_mav.cli.transfers import download, upload
+from faao_mav.cli.main import app
 from faao_mav.errors import LinkError
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Fence
@@ -26,11 +24,6 @@ from faao_mav.wire.messages import Envelope, MissionRequestList
 from faao_mav.wire.protocol import MavResult, MissionType
 from faao_mav.wire.transport import Transport
 from faao_mav.wire.wire_items import wire_items
-
-app = typer.Typer(pretty_exceptions_enable=False)
-app.command()(upload)
-app.command()(download)
-app.command()(autopilot)
 
 
 def run(*arguments: object) -> Result:
