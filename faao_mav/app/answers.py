@@ -15,21 +15,18 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import Command
 from faao_mav.mission.fence_area import Area
 from faao_mav.optimizer.rough import RoughFlight, rough_flight
 from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.zones import PolygonZone
-from faao_mav.report import write_part
+from faao_mav.report.maps import WAYPOINTS, placed_items
+from faao_mav.report.page import write_part
 from faao_mav.report.style import SPEEDS
 from faao_mav.validate.demands import energy_use
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result, plan_mission
-
-_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
-"""The commands of a relay route, whose items are numbered on the map."""
 
 FILES = {
     "mission.waypoints": ("Mission, QGC WPL 110 (.waypoints)", ""),
@@ -141,11 +138,7 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         ]
     if result is not None and result.conversion is not None:
         drawn["track"] = degrees(thinned(result.conversion.schedule.track()["predicted_w"]))
-        drawn["waypoints"] = [
-            [number, [item.x, item.y]]
-            for number, item in enumerate(result.conversion.mission.items, 1)
-            if item.command in _WAYPOINTS and (item.x or item.y)
-        ]
+        drawn["waypoints"] = placed_items(result.conversion.mission, WAYPOINTS)
     return drawn
 
 

@@ -120,7 +120,10 @@ class Page:
                                 partial(self._hint, _HINTS[shape]))  # fmt: skip
             _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
             _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
-            shown = ui.switch("Background", on_change=self._show_background)
+            shown = ui.switch(
+                "Background",
+                on_change=lambda e: call("background", self._background if e.value else None),
+            )
             if self._background["url"].startswith(TILES):
                 shown.tooltip("OpenStreetMap: the parts of the map that you look at are asked for "
                               f"from {TILES.removeprefix('https://')}")  # fmt: skip
@@ -246,9 +249,6 @@ class Page:
         if flown:
             tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
             self._chart.run_chart_method("dispatchAction", tip)
-
-    def _show_background(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        self._map.run_method("background", self._background if event.value else None)
 
     def _key(self, event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):

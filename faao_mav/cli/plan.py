@@ -56,7 +56,7 @@ def plan(
     validation found errors, or it is not known to be on the vehicle; 2 unusable arguments or
     input.
     """
-    from faao_mav.report import summary, write_part
+    from faao_mav.report import summary
     from faao_mav.workflow import plan_mission
 
     if upload is None and (system is not None or allow_armed):
@@ -72,6 +72,8 @@ def plan(
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
             if path is not None:
+                from faao_mav.report.page import write_part
+
                 write_part(result, name.removeprefix("--"), path)
         mission = result.write(out) if out is not None else ()
     written = [*mission, *filter(None, files.values())]

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
+WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on its map."""
 
 _PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
@@ -75,7 +75,7 @@ def route_map(
         for way in _ways(plan, conversion) if outlines else ():
             seen.append(way)
             plot.plot(*way.T, color=MUTED, linewidth=0.9, label="from and to home")
-        numbers = _draw_items(plot, conversion.mission, frame, _WAYPOINTS, "waypoint")
+        numbers = _draw_items(plot, conversion.mission, frame, WAYPOINTS, "waypoint")
         seen += [place[np.newaxis] for _, place in numbers]
     if any(station.moves for station in plan.radio.stations):  # its way is drawn with its mark
         plot.plot([], [], color=INK, linewidth=1.0, label="station moves")
@@ -98,6 +98,17 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
         _show_all(plot, np.concatenate([flown, *places]), outlines)
         write_beside(plot, numbers)
     return figure
+
+
+def placed_items(
+    mission: Mission, commands: Collection[int]
+) -> list[tuple[int, tuple[float, float]]]:
+    """Return number, from 1, and latitude and longitude of the items with one of `commands`."""
+    return [
+        (number, (item.x, item.y))
+        for number, item in enumerate(mission.items, 1)
+        if item.command in commands and (item.x or item.y)
+    ]
 
 
 def _draw_fence(plot: "Axes", fence: Fence, frame: LocalFrame) -> list[Real]:
@@ -161,11 +172,9 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
 def _draw_items(
     plot: "Axes", mission: Mission, frame: LocalFrame, commands: Collection[int], name: str
 ) -> list[tuple[str, Real]]:
-    """Draw the items with one of `commands`; return their numbers, from 1, and places (2,), m."""
+    """Draw the items of `placed_items`; return their numbers and places (2,), m."""
     found = [
-        (str(number), frame.to_local(item.x, item.y))
-        for number, item in enumerate(mission.items, 1)
-        if item.command in commands and (item.x or item.y)
+        (str(number), frame.to_local(*place)) for number, place in placed_items(mission, commands)
     ]
     places = np.reshape([place for _, place in found], (-1, 2))
     plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)

@@ -5,13 +5,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from faao_mav.files import write_whole
+from faao_mav.optimizer.solution import save_solution
 from faao_mav.plan.yaml_text import shown as text_of
 from faao_mav.report.debrief import FromLog
-from faao_mav.report.figures import mission_figures, plan_figures
-from faao_mav.report.style import inline_svg
+from faao_mav.report.figures import flight_figure, mission_figures, plan_figures
+from faao_mav.report.style import inline_svg, save_figure
 from faao_mav.report.summary import Line, check_lines, result_lines
+from faao_mav.schedule.precoder_table import precoder_table
 from faao_mav.validate import Check, Finding
 from faao_mav.validate.rule import by_rule, said_of
 from faao_mav.workflow import Result
@@ -40,6 +44,21 @@ def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
     if not title and isinstance(about, Result):
         title = about.solution.plan.name
     return page(title or "Relay flight", "\n".join(_sections(about)))
+
+
+def write_part(result: Result, part: str, path: Path) -> None:
+    """Write the `part` "save", "precoders", "report" or "figure" of `result` to the file `path`.
+
+    Raises `InputError` where it cannot be written, and for precoders that are no table.
+    """
+    solution, conversion = result.solution, result.conversion
+    if part == "save":
+        save_solution(solution, path, conversion.schedule.track() if conversion else None)
+    elif part == "figure":
+        save_figure(flight_figure(solution, conversion, result.prediction), path)
+    else:
+        text = render_report(result) if part == "report" else precoder_table(solution)
+        write_whole(path, text.encode())
 
 
 def page(title: str, content: str) -> str:

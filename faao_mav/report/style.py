@@ -6,7 +6,6 @@ Figures are matplotlib's, made without pyplot: there is no global state and no w
 import html
 import io
 import itertools
-import math
 import re
 import warnings
 from collections.abc import Iterator, Sequence
@@ -181,21 +180,21 @@ def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0
         )  # fmt: skip
         box = shown.get_window_extent()
         size = np.array([box.width, box.height]) / 2
-        best: tuple[float, Any, Any] = (math.inf, None, None)
-        for away, side in itertools.product((_NEAR, _FAR) if k < always else (_NEAR,), _AROUND):
-            offset = side * (size + away * pixels)
-            there = box.translated(*offset)
-            clear = there.padded(_CLEAR * pixels)
-            covers = clear.count_contains(dots) + 1e3 * clear.count_overlaps(taken)
-            if not (paper.contains(*there.min) and paper.contains(*there.max)):
-                covers += 1e6
-            best = min(best, (covers, offset, there), key=lambda each: each[0])
-        covers, offset, there = best
+        tried = []
+        for away in (_NEAR, _FAR) if k < always else (_NEAR,):
+            for side in _AROUND:
+                offset = side * (size + away * pixels)
+                there = box.translated(*offset)
+                clear = there.padded(_CLEAR * pixels)
+                outside = not (paper.contains(*there.min) and paper.contains(*there.max))
+                covers = clear.count_contains(dots) + 1e3 * clear.count_overlaps(taken)
+                tried.append((covers + 1e6 * outside, offset, there))
+        covers, offset, there = min(tried, key=lambda each: each[0])
         if covers and k >= always:
             shown.remove()
-            continue
-        shown.set_position(offset / pixels)
-        taken.append(there)
+        else:
+            shown.set_position(offset / pixels)
+            taken.append(there)
 
 
 def _drawn(axes: "Axes") -> Real:
@@ -251,9 +250,7 @@ def inline_svg(figure: "Figure", name: str, title: str) -> str:
     opening, rest = text.split(">", 1)
     box = re.search(r'viewBox="[^"]*"', opening)
     assert box is not None
-    rest = re.sub(r'\bid="([^"]*)"', rf'id="{name}-\1"', rest)
-    rest = re.sub(r'(?:xlink:)?href="#([^"]*)"', rf'href="#{name}-\1"', rest)
-    rest = re.sub(r"url\(#([^)]*)\)", rf"url(#{name}-\1)", rest)
+    rest = re.sub(r'(\bid="|href="#|url\(#)', rf"\1{name}-", rest.replace("xlink:href", "href"))
     rest = re.sub(r"font: ([\d.]+px)[^;\"]*", r"font-size: \1", rest)
     rest = re.sub(r"font-family: [^;\"]*;? ?", "", rest)
     for colour, role in _ROLES.items():

@@ -81,20 +81,21 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield from _goal(solution)
     yield from _height(solution)
     limit = result.saturation
-    limiting = "alphabet" if solution.problem.uav_user.steps is None else "radio's rates"
+    stairs = solution.problem.uav_user.steps is not None
+    limiting = "radio's rates" if stairs else "alphabet"
     most = f", at most {limit.ceiling:.5g} by the {limiting}" if limit else ""
     measure = "" if plan.optimizer.rate == "cutoff" else " of mutual information"
     hops = f"base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f}"
     yield "rate", f"{_told_rate(rates.R_avg, radio.bandwidth_mhz)}{most}{measure} ({hops})"
     half, share = radio.duplex == "half", delivered / rates.R_avg if rates.R_avg else 1.0
     if not radio.causal and share < 1 - _LOSS_TOLD:
-        why = "both hops share the time, and " if half else ""
-        told = f"warning: {100 * (1 - share):.2g} % of R_avg does not arrive: {why}the relay "
+        told = f"warning: {100 * (1 - share):.2g} % of R_avg does not arrive: "
+        told += "both hops share the time, and the relay " if half else "the relay "
         told += "forwards only what it has received; radio.causal: true plans for what arrives"
         yield "", told
     told = _told_rate(delivered, radio.bandwidth_mhz) + _megabytes(plan.megabytes(delivered))
-    shared = "in half duplex " if half else ""
-    yield "delivered", f"{told}; {shared}{100 * share:.2f} % of R_avg"
+    told += "; in half duplex " if half else "; "
+    yield "delivered", f"{told}{100 * share:.2f} % of R_avg"
     if (under := result.shadowed) is not None:
         arrives = under.quantiles
         told = f"{_told_rate(arrives[0.1], radio.bandwidth_mhz)} or more arrives in nine of ten "
@@ -121,17 +122,12 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
         most = f"at most {_told_rate(value, radio.bandwidth_mhz)} (estimate)"
         yield "bound", f"within {short:.2g} % of the best that any route can do: {most}"
     if limit is not None and limit.saturated:
-        told = (
-            "the alphabet is used up"
-            if solution.problem.uav_user.steps is None
-            else "the highest rate is had"
-        )
+        told = "the highest rate is had" if stairs else "the alphabet is used up"
         told += " and the route hardly matters: "
         yield "saturated", f"{told}{limit.spare_db:.1f} dB less power at both stations would do"
     if len(solution.starts) > 1:
-        ranked = sorted(solution.starts.items(), key=lambda start: start[1])
-        (worst, low), (best, high) = ranked[0], ranked[-1]
-        told = f"{len(ranked)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
+        (worst, low), *_, (best, high) = sorted(solution.starts.items(), key=lambda each: each[1])
+        told = f"{len(solution.starts)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
         yield "starts", told
     told = "converged" if solution.converged else "NOT CONVERGED"
     told += f" after {counted(solution.iterations, 'iteration')}"
@@ -188,22 +184,19 @@ def _headline(result: Result) -> str:
     told = f"delivers {rate:.4f} bit/s/Hz for {lasting}"
     if megabytes is not None:
         told = f"delivers {megabytes:.4g} megabytes in {lasting} ({megabits:.4g} Mbit/s)"
-    parts = [f"{plan.name}: {told}" if plan.name else told]
+    told = f"{plan.name}: {told}" if plan.name else told
     if result.no_mission is not None:
-        parts.append("there is no mission for it")
-    elif result.prediction is not None:
-        share = result.prediction.delivered_rate / rate if rate else 1.0
-        parts += [f"the mission keeps {100 * share:.2f} % of it", _wrong(result)]
-    return "; ".join(parts)
+        return f"{told}; there is no mission for it"
+    if result.prediction is None:
+        return told
+    share = result.prediction.delivered_rate / rate if rate else 1.0
+    return f"{told}; the mission keeps {100 * share:.2f} % of it; {_wrong(result)}"
 
 
 def _wrong(result: Result) -> str:
     """Return how many errors and warnings validation found."""
-    counts = [
-        count_of(result.findings, level)
-        for level in (Level.ERROR, Level.WARNING)
-        if any(finding.level is level for finding in result.findings)
-    ]
+    found = {finding.level for finding in result.findings} - {Level.NOTE}
+    counts = [count_of(result.findings, level) for level in Level if level in found]
     return ", ".join(counts) or "no errors or warnings"
 
 
@@ -247,11 +240,8 @@ def _goal(solution: Solution) -> Iterator[Line]:
         yield "goal", told
         return
     of = plan.goal.minimise or ""
-    limit = {
-        "duration": f"{found.limit:g} s given",
-        "power": f"{found.limit:g} dBm given",
-        "energy": f"{found.limit:.4g} Wh without that goal",
-    }[of]
+    units = {"duration": "s given", "power": "dBm given", "energy": "Wh without that goal"}
+    limit = f"{found.limit:{'.4g' if of == 'energy' else 'g'}} {units[of]}"
     told = f"least {of} for {_asked(plan, plan.needed_rate)}: {_minimised(solution)} ({limit})"
     yield "goal", f"{told}; {flights}"
     if (below := found.below) is None:
@@ -265,11 +255,11 @@ def _height(solution: Solution) -> Iterator[Line]:
     """Yield which height was chosen, and what both ends of the choice would bring."""
     if (found := solution.height) is None:
         return
-    plan, ends = solution.plan, []
-    for at, end in ((found.least, found.at_least), (found.most, found.at_most)):
-        brings = "no flight" if end is None else _brought(end)
-        ends.append(f"{brings} at {at:g} m")
-    yield "height", f"{plan.flight.altitude:g} m for {_brought(solution)}; {', '.join(ends)}"
+    low, high = (
+        f"{'no flight' if end is None else _brought(end)} at {at:g} m"
+        for at, end in ((found.least, found.at_least), (found.most, found.at_most))
+    )
+    yield "height", f"{solution.plan.flight.altitude:g} m for {_brought(solution)}; {low}, {high}"
 
 
 def _brought(solution: Solution) -> str:
@@ -318,12 +308,10 @@ def _limits(solution: Solution) -> Iterator[Line]:
 
 
 def _wind(plan: Plan) -> Iterator[Line]:
-    """Yield the plan's wind, if it has one."""
-    wind, told = plan.site.wind, []
-    if any(plan.wind):
-        told.append(f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees")
-    if wind.gust > wind.speed:
-        told.append(f"gusts of {wind.gust:g} m/s")
+    wind = plan.site.wind
+    mean = f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees"
+    told = [mean] if any(plan.wind) else []
+    told += [f"gusts of {wind.gust:g} m/s"] if wind.gust > wind.speed else []
     if told:
         yield "wind", "; ".join(told)
 
@@ -346,14 +334,12 @@ def _moving(solution: Solution, check: Check | None) -> Iterator[Line]:
 
 def _energy(check: Check | None) -> Iterator[Line]:
     """Yield what the whole predicted flight takes, and what of the battery it leaves."""
-    energy = check.energy if check is not None else None
-    if energy is None:
+    if check is None or (energy := check.energy) is None:
         return
     told = f"{energy.total:.4g} Wh for the whole flight"
     if not energy.lands:
         told += " as far as the mission goes, in the air at its end"
-    if energy.battery is not None and energy.left is not None:
-        battery = energy.battery
+    if (battery := energy.battery) is not None and energy.left is not None:
         left = f"{100 * energy.left:.0f} %" if energy.left > 0 else "nothing"
         told += f"; {left} of {battery.capacity_wh:g} Wh is left (reserve {battery.reserve:g} %)"
     yield "energy", told
