@@ -49,7 +49,7 @@ def test_everything_tells_the_same(small_plan: MakePlan, kind: dict[str, Any]) -
     assert predicted["delivered_rate_by_position"] == flown.delivered_by_position
 
     # the queue is in megabytes of a bit/s/Hz for half a second on 20 MHz
-    (axes,) = next(each.figure.axes for each in plan_figures(result) if each.name == "queue")
+    (axes,) = next(each.figure.axes for each in plan_figures(result) if each.heading == "Queue")
     assert axes.get_ylabel() == "waiting, megabytes"
     lines = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.lines}
     assert lines["planned"] == pytest.approx(1.25 * solution.relayed.queue)

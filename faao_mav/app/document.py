@@ -2,7 +2,8 @@
 
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path as File
 from typing import Any, TypeAlias
@@ -123,30 +124,26 @@ class Document:
 
         Raises `PlanError`, and changes nothing, for a value that no plan may hold.
         """
-        data, yaml = self._loaded()
-        value, at = _flow(value), data
-        for step in path[:-1]:
-            if isinstance(step, str) and not isinstance(at.get(step), Mapping | list):
-                at[step] = {}
-            at = at[step]
-        if isinstance(at, list) and path[-1] == len(at):
-            at.append(value)
-        else:
-            at[path[-1]] = value
-        self._keep(data, yaml, gesture)
+        with self._edited(gesture) as at:
+            for step in path[:-1]:
+                if isinstance(step, str) and not isinstance(at.get(step), Mapping | list):
+                    at[step] = {}
+                at = at[step]
+            if isinstance(at, list) and path[-1] == len(at):
+                at.append(_flow(value))
+            else:
+                at[path[-1]] = _flow(value)
 
     def remove(self, path: Path) -> None:
         """Take out what stands at `path`, if anything does."""
         if self.value(path) is None and self.value(path[:-1]) is None:
             return
-        data, yaml = self._loaded()
-        at: Any = data
-        for step in path[:-1]:
-            at = at[step]
-        last: Any = path[-1]
-        if isinstance(at, list) or last in at:
-            del at[last]
-        self._keep(data, yaml, None)
+        with self._edited() as at:
+            for step in path[:-1]:
+                at = at[step]
+            last: Any = path[-1]
+            if isinstance(at, list) or last in at:
+                del at[last]
 
     def replace(self, text: str, source: str) -> None:
         """Take another plan, `text`, of the name `source`; the old one can be had by undo.
@@ -170,7 +167,9 @@ class Document:
         write_whole(self.path, self.text.encode())
         self._on_disk = self.text
 
-    def _loaded(self) -> tuple[Any, Any]:
+    @contextmanager
+    def _edited(self, gesture: object = None) -> Iterator[Any]:
+        """Give the data to change; their text becomes the document's, if a plan may have it."""
         yaml = YAML()
         indent, before = _INDENT.search(self.text), _BEFORE_DASH.search(self.text)
         mapping = len(indent[1]) if indent else 2
@@ -178,17 +177,15 @@ class Document:
         yaml.indent(mapping=mapping, sequence=offset + 2, offset=offset)
         yaml.brace_single_entry_mapping_in_flow_sequence = True
         yaml.preserve_quotes, yaml.width = True, _WIDTH
-        return yaml.load(self.text), yaml
-
-    def _keep(self, data: Any, yaml: Any, gesture: object) -> None:
-        text = io.StringIO()
-        yaml.dump(data, text)
-        if text.getvalue() == self.text:
+        data, written = yaml.load(self.text), io.StringIO()
+        yield data
+        yaml.dump(data, written)
+        if (text := written.getvalue()) == self.text:
             return
         again = gesture is not None and gesture == self._gesture
-        _parsed(text.getvalue(), self.source)
+        _parsed(text, self.source)
         kept = self._texts[: self._at if again else self._at + 1]
-        self._texts = [*kept, text.getvalue()]
+        self._texts = [*kept, text]
         self._at, self._gesture = len(kept), gesture
 
 

@@ -94,12 +94,7 @@ class Page:
             _button("folder_open", "Open a plan", self._open_dialog)
             self._save_button = _button("save", "Save (Ctrl+S)", self._save)
             with _button("download", "Download"), ui.menu():
-                ui.menu_item(
-                    "Plan (.yaml)",
-                    lambda: ui.download.content(
-                        self._document.text, Path(self._document.source).name
-                    ),
-                )
+                ui.menu_item("Plan (.yaml)", self._download_plan)
                 for wanted, (label, _) in FILES.items():
                     ui.menu_item(label, partial(self._download, wanted))
             # only the browser knows which of both it shows until one is chosen
@@ -295,6 +290,9 @@ class Page:
     def _plan_file(self) -> Path | None:
         """The file that has the plan as it is now, or None."""
         return self._document.path if self._document.saved else None
+
+    def _download_plan(self) -> None:
+        ui.download.content(self._document.text, Path(self._document.source).name)
 
     async def _download(self, wanted: str) -> None:
         if self._answer.result is None:

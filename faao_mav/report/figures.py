@@ -29,9 +29,8 @@ _COLOURS = {"planned": SERIES[0], "predicted": SERIES[1], "flown": SERIES[2]}
 
 
 class Shown(NamedTuple):
-    """A figure of the page: a name for its identifiers, its heading, and what it shows."""
+    """A figure of the page: its heading, and what it shows."""
 
-    name: str
     heading: str
     figure: "Figure"
     title: str
@@ -88,11 +87,11 @@ def mission_figures(check: Check, *, alone: bool) -> Iterator[Shown]:
     """Yield those of a mission: its map and its motion where it is `alone`, and its energy."""
     if alone and (track := check.track) is not None:
         title = "Map of the predicted flight with the mission's items and its fence, metres"
-        yield Shown("mission-map", "Mission", mission_map(check.mission, track), title)
+        yield Shown("Mission", mission_map(check.mission, track), title)
         speed = _Plot("ground speed, m/s", {"": (track.t, lengths(track.velocity[:, :2]))})
         height = _Plot("height above home, m", {"": (track.t, track.position[:, 2])})
         title = "Predicted ground speed and height above home over time"
-        yield Shown("mission-motion", "Flight", _figure(speed, height), title)
+        yield Shown("Flight", _figure(speed, height), title)
     if (use := check.energy) is not None:
         what, stored = "energy that is used", _Plot("used, Wh", {"": (use.t, use.used)})
         if use.battery is not None:
@@ -102,7 +101,7 @@ def mission_figures(check: Check, *, alone: bool) -> Iterator[Shown]:
             stored = _Plot("left, Wh", {"": (use.t, full - use.used)}, reserve)
         title = f"Power of the whole predicted flight over time, and the {what}"
         figure = _figure(_Plot("power, W", {"": (use.t, use.power)}), stored)
-        yield Shown("energy", "Energy", figure, title)
+        yield Shown("Energy", figure, title)
 
 
 def plan_figures(result: Result, log: FromLog | None = None) -> Iterator[Shown]:
@@ -117,35 +116,35 @@ def plan_figures(result: Result, log: FromLog | None = None) -> Iterator[Shown]:
         "north in metres, coloured by speed, with stations, waypoints by item number, flights and "
         "the fence"
     )
-    yield Shown("route", "Route", route_figure(solution, conversion, flown), title)
+    yield Shown("Route", route_figure(solution, conversion, flown), title)
     if log is not None:
         apart = {"predicted": log.found.predicted, "flown": log.found.flown}
         off = {name: (t, lengths(each.w - solution.w)) for name, each in apart.items()}
         title = "Distance from the planned place at equal times, as predicted and as flown"
         figure = _figure(_Plot("distance from the plan, m", off))
-        yield Shown("apart", "Off the plan", figure, title)
+        yield Shown("Off the plan", figure, title)
     first = 0 if plan.flight.bound_first_acceleration else 1  # the paper leaves a(0) unbounded
     needed = {"planned": (t[first:], lengths(solution.a)[first:])}
     acceleration = _Plot("acceleration, m/s²", needed, {"a_max": plan.vehicle.max_acceleration})
     title = "Speed and acceleration over time, with their limits"
-    yield Shown("motion", "Motion", _figure(_speed(solution, conversion), acceleration), title)
+    yield Shown("Motion", _figure(_speed(solution, conversion), acceleration), title)
     hops = _figure(*_hops(solution, flights), sharey=True)
-    yield Shown("rates", "Link", hops, "Rates of both links over time")
+    yield Shown("Link", hops, "Rates of both links over time")
     held, unit = _of_a_slot(plan)
     waiting = {name: (t, held * flight.relayed.queue) for name, flight in flights.items()}
     buffer = {"buffer": most} if (most := plan.radio.relay.buffer_mbytes) else {}
     half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
     title = f"What the relay has received and not yet forwarded, over time{half}"
-    yield Shown("queue", "Queue", _figure(_Plot(f"waiting, {unit}", waiting, buffer)), title)
+    yield Shown("Queue", _figure(_Plot(f"waiting, {unit}", waiting, buffer)), title)
     if (under := result.shadowed) is not None:
         title = f"What has arrived over time, as {rate} counts it: planned without shadowing; "
         title += "with it the median, and in the band eight of ten, one above, one below"
-        yield Shown("arrival", "What arrives", _arrival(solution, under), title)
+        yield Shown("What arrives", _arrival(solution, under), title)
     begun, ended = solution.history[0], solution.history[-1]
     title = f"{rate} after each iteration, from {begun:.4f} to {ended:.4f} bit/s/Hz"
-    yield Shown("convergence", "Convergence", _convergence(solution), title)
+    yield Shown("Convergence", _convergence(solution), title)
     title = "Power on each stream over time, base station and UAV, strongest stream first"
-    yield Shown("power", "Precoders", _precoder_power(solution), title)
+    yield Shown("Precoders", _precoder_power(solution), title)
 
 
 def _arrival(solution: Solution, under: Shadowed) -> "Figure":

@@ -191,13 +191,9 @@ def link_page(fit: LinkFit, report: LinkReport) -> str:
     left = "Measured over fitted gain, dB, where it was flown, metres east and north of the station"
     sections = [
         section("Link", facts(report.lines), "wide"),
-        figure_section(
-            "distance", "Over distance", distance, f"{over} distance from the station's antenna"
-        ),
-        figure_section("elevation", "Over elevation", elevation, seen_at),
-        figure_section(
-            "residuals", "Left by the law", _map(place, level - fit.gain_db(place)), left
-        ),
+        figure_section("Over distance", distance, f"{over} distance from the station's antenna"),
+        figure_section("Over elevation", elevation, seen_at),
+        figure_section("Left by the law", _map(place, level - fit.gain_db(place)), left),
     ]
     return page("The link as it was measured", "\n".join(sections))
 

@@ -144,8 +144,9 @@ def _findings(findings: Sequence[Finding]) -> str:
     return f"<ul>{''.join(items)}</ul>"
 
 
-def figure_section(name: str, heading: str, figure: "Figure", title: str) -> str:
+def figure_section(heading: str, figure: "Figure", title: str) -> str:
     """Return a figure under its heading, with what it shows below."""
+    name = heading.lower().replace(" ", "-")
     return section(heading, inline_svg(figure, name, title) + f"<p>{escape(title)}.</p>")
 
 

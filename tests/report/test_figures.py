@@ -27,9 +27,10 @@ def every() -> list[Any]:
     ]
 
 
-def of_page(name: str, result: Result) -> Any:
-    """The axes of the figure of `name` on the page of `result`."""
-    return next(each.figure.axes for each in figures.plan_figures(result) if each.name == name)
+def of_page(heading: str, result: Result) -> Any:
+    """The axes of the figure under a heading of the page of `result`."""
+    shown = figures.plan_figures(result)
+    return next(each.figure.axes for each in shown if each.heading == heading)
 
 
 def lines(axes: Any) -> dict[str, Any]:
@@ -61,7 +62,7 @@ def test_axes_are_named_with_units_and_legends_hide_no_curve() -> None:
 
 def test_the_curves_are_the_flight() -> None:
     solution = flown().solution
-    speed, acceleration = of_page("motion", flown())
+    speed, acceleration = of_page("Motion", flown())
     planned = lines(speed)["planned"]
     np.testing.assert_array_equal(planned.get_xdata(), solution.t)
     np.testing.assert_array_equal(planned.get_ydata(), np.hypot(*solution.v.T))
@@ -71,7 +72,7 @@ def test_the_curves_are_the_flight() -> None:
     assert late > 1
     over = lines(speed)["predicted"].get_xdata()[-1]
     assert over == pytest.approx(solution.t[-1] + late, abs=0.5)  # to its end
-    to_uav, to_user = of_page("rates", flown())
+    to_uav, to_user = of_page("Link", flown())
     np.testing.assert_array_equal(lines(to_uav)["planned"].get_ydata(), solution.I_U)
     np.testing.assert_array_equal(lines(to_user)["predicted"].get_ydata(), prediction().I_G)
 
@@ -83,7 +84,7 @@ def test_what_arrives_ends_at_what_the_summary_tells(causal: bool, bandwidth: fl
     solution = replace(flown().solution, problem=build_problem(plan))
     under = shadowed(solution)
     assert under is not None
-    (axes,) = of_page("arrival", Result(solution, shadowed=under))
+    (axes,) = of_page("What arrives", Result(solution, shadowed=under))
     whole = plan.flight.slots * plan.flight.time_step * (bandwidth / 8 if bandwidth else 1)
     reached = solution.delivered_rate if causal else solution.rates.R_avg
     ends = {name: line.get_ydata()[-1] / whole for name, line in lines(axes).items()}
@@ -100,7 +101,7 @@ def test_an_unbounded_first_acceleration_leaves_the_rest_to_be_seen(small_plan: 
     solution = optimize(plan)
     a = solution.a.copy()
     a[0] = (240.0, 0.0)
-    _, acceleration = of_page("motion", Result(replace(solution, a=a)))
+    _, acceleration = of_page("Motion", Result(replace(solution, a=a)))
     assert acceleration.get_ylim()[1] < 10
 
 
@@ -108,7 +109,7 @@ def test_streams_add_up_to_the_power_and_the_strongest_is_first(small_plan: Make
     changes = {"radio.csi": "instantaneous", "radio.fading_samples": 2,
                "optimizer.max_iterations": 2}  # fmt: skip
     for solution in (flown().solution, optimize(small_plan(changes))):
-        station, _ = of_page("power", Result(solution))
+        station, _ = of_page("Precoders", Result(solution))
         first, second = (lines(station)[f"stream {k}"].get_ydata() for k in (1, 2))
         used = np.sum(np.abs(solution.P_B) ** 2, axis=(-2, -1))
         each_slot = used.mean(axis=0) if used.ndim == 2 else used  # averaged over the draws
