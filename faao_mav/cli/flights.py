@@ -7,44 +7,30 @@ from typing import Any
 
 import typer
 
-from faao_mav.cli.shared import (
-    AS_JSON,
-    PLAN_FILE,
-    RADIO,
-    SOLUTION_FILE,
-    SYSTEM,
-    VEHICLE,
-    File,
-    check_outputs,
-    flag,
-    note,
-    option,
-    planned,
-    read_noted,
-    show,
-    with_link,
-)
+import faao_mav.cli.shared as cli
 from faao_mav.errors import InputError
 from faao_mav.files import write_whole
 
 
-@with_link
+@cli.with_link
 def fly(
     mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
-    to: str = option("CONNECTION", VEHICLE, default=...),
-    plan_file: File = PLAN_FILE,
-    solution_file: File = SOLUTION_FILE,
-    arm: bool = flag("--arm", "Arm the vehicle and start the mission."),
-    stream: bool = flag(
+    to: str = cli.option("CONNECTION", cli.VEHICLE, default=...),
+    plan_file: cli.File = cli.PLAN_FILE,
+    solution_file: cli.File = cli.SOLUTION_FILE,
+    arm: bool = cli.flag("--arm", "Arm the vehicle and start the mission."),
+    stream: bool = cli.flag(
         "--stream", "Fly the plan by setpoints instead of the mission; needs --arm."
     ),
-    rate: float = option("HZ", "Setpoints a second of --stream.", min=4, max=50, default=10.0),
-    elsewhere: bool = flag(
+    rate: float = cli.option("HZ", "Setpoints a second of --stream.", min=4, max=50, default=10.0),
+    elsewhere: bool = cli.flag(
         "--elsewhere", "Arm it at another place, or height, than MISSION is made for."
     ),
-    untimed: bool = flag("--untimed", "Arm it with other parameters than MISSION is timed for."),
-    radio: str | None = RADIO,
-    as_json: bool = flag("--json", "Print JSON objects, one a line."),
+    untimed: bool = cli.flag(
+        "--untimed", "Arm it with other parameters than MISSION is timed for."
+    ),
+    radio: str | None = cli.RADIO,
+    as_json: bool = cli.flag("--json", "Print JSON objects, one a line."),
     *,
     link: dict[str, Any],
 ) -> None:
@@ -89,8 +75,8 @@ def fly(
     for name, given in (("--stream", stream), ("--radio", radio)):
         if given and plan_file is None and solution_file is None:
             raise InputError(f"{name}: needs --plan or --solution: the flight that is planned")
-    file = read_noted(mission_file)
-    solution = planned(plan_file, solution_file)
+    file = cli.read_noted(mission_file)
+    solution = cli.planned(plan_file, solution_file)
     radios = Radios(solution, radio) if solution is not None and radio is not None else None
     plan = solution.plan if solution is not None else None
     vehicle, _ = choose_vehicle(mission_file, file, plan, (None, None, None))
@@ -101,7 +87,7 @@ def fly(
         wind = plan.wind if plan is not None else (0.0, 0.0)
         track, reason = predicted(file.mission, vehicle, wind)
         if track is None:
-            note(f"the flight is not predicted: {reason}")
+            cli.note(f"the flight is not predicted: {reason}")
     telling = Telling(solution, track, radios, say)
     rate = rate if stream else POSITION_RATE
     if radios is not None and plan is not None:  # two positions for each slot at least
@@ -133,19 +119,19 @@ def fly(
     elif lines := joined(flight_lines(report, found)):
         typer.echo(lines)
     if ending is None and not as_json:
-        note("the vehicle holds another mission than the file: upload it first")
+        cli.note("the vehicle holds another mission than the file: upload it first")
     if ending is None or ending.kind != "finished":
         raise typer.Exit(1)
 
 
 def debrief(
     log: Path = typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg."),
-    plan_file: File = PLAN_FILE,
-    solution_file: File = SOLUTION_FILE,
-    system: int | None = SYSTEM,
-    report: File = option("PAGE.html", "One page with all three tracks."),
-    radio: str | None = RADIO,
-    as_json: bool = AS_JSON,
+    plan_file: cli.File = cli.PLAN_FILE,
+    solution_file: cli.File = cli.SOLUTION_FILE,
+    system: int | None = cli.SYSTEM,
+    report: cli.File = cli.option("PAGE.html", "One page with all three tracks."),
+    radio: str | None = cli.RADIO,
+    as_json: bool = cli.AS_JSON,
 ) -> None:
     """Say what became of a plan, from the log of its flight.
 
@@ -160,7 +146,7 @@ def debrief(
     if plan_file is None and solution_file is None:
         raise InputError("--plan or --solution: give the plan that was flown")
     inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
-    check_outputs({"--report": report}, inputs)
+    cli.check_outputs({"--report": report}, inputs)
     from faao_mav.fly.logs import read_log
     from faao_mav.fly.telling import Radios
     from faao_mav.report.debrief import FromLog
@@ -168,7 +154,7 @@ def debrief(
     from faao_mav.workflow import Result, with_mission
 
     records = read_log(log, system)  # what is no log is refused before the plan is solved
-    solution = planned(plan_file, solution_file)
+    solution = cli.planned(plan_file, solution_file)
     assert solution is not None
     radios = None if radio is None else Radios(solution, radio)
     told = FromLog.of(records, with_mission(Result(solution)), str(log))
@@ -177,7 +163,7 @@ def debrief(
 
         page = render_report(told, title=log.name)
         write_whole(report, page.encode())
-    show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
+    cli.show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
     if radios is not None:
         count = radios.replay(told.record.line(solution, told.found.start))
-        note(f"{count} slots were told to {radio}")
+        cli.note(f"{count} slots were told to {radio}")

@@ -10,16 +10,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from faao_mav.cli.shared import (
-    AS_JSON,
-    File,
-    check_outputs,
-    note,
-    option,
-    progress,
-    read_numbers,
-    show,
-)
+import faao_mav.cli.shared as cli
 from faao_mav.errors import InputError
 from faao_mav.files import check_ending, read_text, write_together, write_whole
 
@@ -30,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def link(
-    station: str = option(
+    station: str = cli.option(
         "LAT,LON,HEIGHT",
         "The station's antenna: degrees, and m as the altitudes, over terrain m above ground.",
         default=...,
@@ -38,40 +29,42 @@ def link(
     logs: list[Path] | None = typer.Argument(
         None, metavar="[LOG...]", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
     ),
-    out: File = option("LINK.yaml", "What to write: a plan's radio.gain."),
-    power: float | None = option("DBM", "What was sent, dBm; without: shape only."),
-    noise: float | None = option("DBM", "Noise of the receiver, dBm: for snr."),
-    rates: File = option("TABLE.csv", "The radio's rates, as a plan has them: for throughput."),
-    unit: list[str] | None = option("COLUMN=UNIT", "The unit of a column; may be repeated."),
-    calibrate: list[str] | None = option(
+    out: cli.File = cli.option("LINK.yaml", "What to write: a plan's radio.gain."),
+    power: float | None = cli.option("DBM", "What was sent, dBm; without: shape only."),
+    noise: float | None = cli.option("DBM", "Noise of the receiver, dBm: for snr."),
+    rates: cli.File = cli.option(
+        "TABLE.csv", "The radio's rates, as a plan has them: for throughput."
+    ),
+    unit: list[str] | None = cli.option("COLUMN=UNIT", "The unit of a column; may be repeated."),
+    calibrate: list[str] | None = cli.option(
         "COUNT=DBM", "What a device counts at a level; once or twice."
     ),
-    mean: float = option(
+    mean: float = cli.option(
         "S", "Time over which levels are averaged, s.", min=0.1, max=60.0, default=2.0
     ),
-    map_file: File = option(
+    map_file: cli.File = cli.option(
         "MAP.npz", "What the law leaves of the logs, as a map above it.", "--map"
     ),
-    terrain: list[Path] | None = option(
+    terrain: list[Path] | None = cli.option(
         "DEM", "No log: heights, .hgt or GeoTIFF; may be repeated. The map is beside --out."
     ),
-    frequency: float | None = option("MHZ", "Over terrain: the frequency."),
-    clutter: float = option(
+    frequency: float | None = cli.option("MHZ", "Over terrain: the frequency."),
+    clutter: float = cli.option(
         "M", "Over terrain: the height of woods and houses.", min=0.0, max=200.0, default=0.0
     ),
-    heights: str = option(
+    heights: str = cli.option(
         "M,M",
         "Over terrain: heights of the map above the station's ground.",
         default="40,60,80,100,120",
     ),
-    radius: float = option(
+    radius: float = cli.option(
         "M", "Over terrain: how far the map goes.", min=10.0, max=50_000.0, default=1000.0
     ),
-    spacing: float = option(
+    spacing: float = cli.option(
         "M", "Over terrain: steps of the map.", min=1.0, max=1000.0, default=20.0
     ),
-    report: File = option("PAGE.html", "Measured against fitted, on one page."),
-    as_json: bool = AS_JSON,
+    report: cli.File = cli.option("PAGE.html", "Measured against fitted, on one page."),
+    as_json: bool = cli.AS_JSON,
 ) -> None:
     """Fit the law of a link's path gain to what was measured in flight, or to terrain.
 
@@ -88,7 +81,7 @@ def link(
     input.
     """
     wanted = f"--station {station}: expected LAT,LON,HEIGHT, degrees and m"
-    place = read_numbers(station, 3, wanted)
+    place = cli.read_numbers(station, 3, wanted)
     if abs(place[0]) > 90 or abs(place[1]) > 180:
         raise InputError(wanted)
     units = {}
@@ -98,7 +91,7 @@ def link(
         if not told:
             raise InputError(f"--unit {each}: expected COLUMN=UNIT, as in rssi=dbm")
     points = [
-        read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
+        cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
         for each in calibrate or []
     ]
     if len(points) > 2 or len({count for count, *_ in points}) < len(points):
@@ -115,7 +108,7 @@ def link(
         if out is None:
             raise InputError("--map: give --out, the file that names it")
     inputs |= {f"--terrain {path}": path for path in terrain or ()}
-    check_outputs({"--out": out, "--map": map_file, "--report": report}, inputs)
+    cli.check_outputs({"--out": out, "--map": map_file, "--report": report}, inputs)
     if bool(logs) == bool(terrain):
         raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
     written = []
@@ -151,7 +144,7 @@ def link(
         written = [*map(str, reversed(contents)), *written]
     from faao_mav.report.summary import joined
 
-    show(
+    cli.show(
         lambda: found.record | {"written": written},
         lambda: [joined([*found.lines, ("files", ", ".join(written) or "none")])],
         as_json=as_json,
@@ -171,7 +164,7 @@ def _over_terrain(
     if frequency is None or not 30 <= frequency <= 100_000:
         raise InputError("--frequency: expected MHz, 30 to 100000, for --terrain")
     wanted = f"--heights {heights}: expected metres that rise, as 40,60,80"
-    levels = read_numbers(heights, heights.count(",") + 1, wanted)
+    levels = cli.read_numbers(heights, heights.count(",") + 1, wanted)
     if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= 20_000:
         raise InputError(wanted)
     from faao_mav.radio.terrain import read_terrain, terrain_map
@@ -182,8 +175,10 @@ def _over_terrain(
         raster, unknown = read_terrain(path)
         rasters.append(raster)
         if unknown:
-            note(f"{path}: {unknown:,} heights are not known and taken from the nearest that are")
-    with progress(shown=sys.stderr.isatty()) as observe:
+            cli.note(
+                f"{path}: {unknown:,} heights are not known and taken from the nearest that are"
+            )
+    with cli.progress(shown=sys.stderr.isatty()) as observe:
         found = terrain_map(rasters, station, 1e6 * frequency, levels, *size, observe)
     return over_terrain(found, frequency, ", ".join(path.name for path in paths))
 
@@ -221,7 +216,7 @@ def _flights(
     if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
         found = read_measured(path, station, units, calibration)
         if found.left_out:
-            note(f"{path}: {found.left_out} rows without a number are left out")
+            cli.note(f"{path}: {found.left_out} rows without a number are left out")
         yield found.samples, found.unit
         return
     from faao_mav.fly.logs import read_log
@@ -256,5 +251,7 @@ def _by_rates(path: Path, samples: "Samples", rates: Path | None) -> "Samples":
     told = np.where(samples.level < steps.most, samples.level, np.nan)
     snr = np.interp(told, steps.rates, steps.snr_db, left=np.nan)
     if lost := int(np.sum(~np.isfinite(snr))):
-        note(f"{path}: {lost} rows at the least or the greatest rate tell no SNR and are left out")
+        cli.note(
+            f"{path}: {lost} rows at the least or the greatest rate tell no SNR and are left out"
+        )
     return replace(samples, level=snr)

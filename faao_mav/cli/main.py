@@ -12,13 +12,13 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+import faao_mav.cli.shared as cli
 from faao_mav.cli.flights import debrief, fly
 from faao_mav.cli.link import link
 from faao_mav.cli.missions import convert, validate
 from faao_mav.cli.plan import plan
 from faao_mav.cli.serving import app as page
 from faao_mav.cli.serving import autopilot
-from faao_mav.cli.shared import exit_status, note
 from faao_mav.cli.study import study
 from faao_mav.cli.transfers import download, upload
 from faao_mav.errors import HangUp
@@ -61,7 +61,7 @@ app = typer.Typer(
 )
 COMMANDS = (plan, validate, upload, download, fly, debrief, link, convert, autopilot, study, page)
 for command in COMMANDS:
-    app.command(command.__name__)(exit_status()(command))
+    app.command(command.__name__)(cli.exit_status()(command))
 
 
 def _version(asked: bool) -> None:
@@ -114,7 +114,7 @@ def run() -> None:
         app()
     except OSError as error:
         where = error.filename or "standard output"
-        note(f"{where}: cannot be used: {error.strerror or error}")
+        cli.note(f"{where}: cannot be used: {error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is buffered fails no second time
         sys.exit(2)
     finally:

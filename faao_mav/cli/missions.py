@@ -9,22 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from faao_mav.cli.shared import (
-    AS_JSON,
-    AUTOPILOT,
-    PLAN_FILE,
-    SOLUTION_FILE,
-    File,
-    check_known,
-    check_outputs,
-    flag,
-    option,
-    planned,
-    read_noted,
-    read_wind,
-    show,
-    write_noted,
-)
+import faao_mav.cli.shared as cli
 from faao_mav.errors import InputError, printable
 from faao_mav.files import write_whole
 
@@ -33,30 +18,30 @@ if TYPE_CHECKING:
 
 
 def validate(
-    mission_file: File = typer.Argument(
+    mission_file: cli.File = typer.Argument(
         None, metavar="MISSION", help="The mission: .waypoints or .plan."
     ),
-    plan_file: File = PLAN_FILE,
-    solution_file: File = SOLUTION_FILE,
-    autopilot: str | None = AUTOPILOT,
-    kind: str | None = option("NAME", "What flies it: copter or plane.", "--type"),
-    parameters: File = option(
+    plan_file: cli.File = cli.PLAN_FILE,
+    solution_file: cli.File = cli.SOLUTION_FILE,
+    autopilot: str | None = cli.AUTOPILOT,
+    kind: str | None = cli.option("NAME", "What flies it: copter or plane.", "--type"),
+    parameters: cli.File = cli.option(
         "FILE.param",
         "The vehicle's parameters; without: those of the file of parameters beside MISSION, "
         "if there is one.",
     ),
-    max_duration: float | None = option("S", "The longest flight, seconds."),
-    max_distance: float | None = option("M", "The farthest from home, metres."),
-    max_altitude: float | None = option("M", "The highest above home, metres."),
-    wind: str | None = option(
+    max_duration: float | None = cli.option("S", "The longest flight, seconds."),
+    max_distance: float | None = cli.option("M", "The farthest from home, metres."),
+    max_altitude: float | None = cli.option("M", "The highest above home, metres."),
+    wind: str | None = cli.option(
         "SPEED,FROM",
         "The wind to predict the flight in, m/s and degrees clockwise from north that it comes "
         "from; without: the plan's.",
     ),
-    report: File = option("PAGE.html", "One page with map and findings."),
-    strict: bool = flag("--strict", "Warnings fail as well."),
-    as_json: bool = AS_JSON,
-    rules: bool = flag("--rules", "List the rules and stop."),
+    report: cli.File = cli.option("PAGE.html", "One page with map and findings."),
+    strict: bool = cli.flag("--strict", "Warnings fail as well."),
+    as_json: bool = cli.AS_JSON,
+    rules: bool = cli.flag("--rules", "List the rules and stop."),
 ) -> None:
     """Check a mission before anyone walks to the field.
 
@@ -72,21 +57,21 @@ def validate(
     from faao_mav.validate import RULES, Level, Limits, check
 
     if rules:
-        show(lambda: _rules_as_dict(RULES), lambda: _rule_lines(RULES), as_json=as_json)
+        cli.show(lambda: _rules_as_dict(RULES), lambda: _rule_lines(RULES), as_json=as_json)
         return
     if mission_file is None:
         raise InputError("MISSION: give a .waypoints or .plan file, or --rules")
-    check_known(autopilot, kind)
+    cli.check_known(autopilot, kind)
     most = {"duration": max_duration, "distance": max_distance, "altitude": max_altitude}
     for name, value in most.items():
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"--max-{name} {value:g}: expected a number above 0")
-    air = read_wind(wind)
+    air = cli.read_wind(wind)
     inputs = {"MISSION": mission_file, "--plan": plan_file, "--solution": solution_file}
-    check_outputs({"--report": report}, inputs)
-    solution = planned(plan_file, solution_file)
+    cli.check_outputs({"--report": report}, inputs)
+    solution = cli.planned(plan_file, solution_file)
     plan = solution.plan if solution is not None else None
-    file = read_noted(mission_file)
+    file = cli.read_noted(mission_file)
     vehicle, chosen_by = choose_vehicle(mission_file, file, plan, (autopilot, kind, parameters))
     if vehicle.type.flight_model is not None:
         vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
@@ -100,7 +85,7 @@ def validate(
         about = Result(solution, check=found) if solution is not None else found
         page = render_report(about, title=printable(mission_file.name))
         write_whole(report, page.encode())
-    show(
+    cli.show(
         lambda: {"mission": str(mission_file), **_as_dict(found)},
         lambda: _lines(f"{mission_file}", chosen_by, found),
         as_json=as_json,
@@ -113,9 +98,9 @@ def convert(
     mission_file: Path = typer.Argument(
         metavar="MISSION", help="The mission: .waypoints, .txt or .plan."
     ),
-    out: Path = option("OTHER", "What to write: .waypoints, .txt, .plan or .kml.", default=...),
-    autopilot: str | None = AUTOPILOT,
-    as_json: bool = AS_JSON,
+    out: Path = cli.option("OTHER", "What to write: .waypoints, .txt, .plan or .kml.", default=...),
+    autopilot: str | None = cli.AUTOPILOT,
+    as_json: bool = cli.AS_JSON,
 ) -> None:
     """Write a mission in another format, and say what that cannot hold.
 
@@ -130,16 +115,16 @@ def convert(
     from faao_mav.autopilot.files import made_for, plan_target
     from faao_mav.mission.formats import check_suffix
 
-    check_known(autopilot, None)
+    cli.check_known(autopilot, None)
     check_suffix(out)
-    check_outputs({"--out": out}, {"MISSION": mission_file})
-    read = read_noted(mission_file)
+    cli.check_outputs({"--out": out}, {"MISSION": mission_file})
+    read = cli.read_noted(mission_file)
     kind = kind_by_number(read.vehicle_type) or "copter"
     whose = autopilot or made_for(mission_file, read).autopilot
     vehicle = Vehicle(whose, kind) if whose is not None else None
-    written = write_noted(read.mission, out, plan_target(vehicle))
+    written = cli.write_noted(read.mission, out, plan_target(vehicle))
     items, names = len(read.mission.items), " and ".join(map(str, written.contents))
-    show(
+    cli.show(
         lambda: {"items": items, "lost": written.lost, "written": str(out)},
         lambda: [f"{items} items written to {names}"],
         as_json=as_json,

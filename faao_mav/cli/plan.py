@@ -6,18 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from faao_mav.cli.shared import (
-    ALLOW_ARMED,
-    AS_JSON,
-    SYSTEM,
-    File,
-    check_outputs,
-    flag,
-    note,
-    optimizer_progress,
-    option,
-    show,
-)
+import faao_mav.cli.shared as cli
 from faao_mav.cli.transfers import as_dict, send
 from faao_mav.errors import FaaoError, InputError
 
@@ -28,20 +17,24 @@ if TYPE_CHECKING:
 
 def plan(
     plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
-    out: File = option("MISSION", "Write the mission: .waypoints, .txt, .plan or .kml."),
-    save: File = option("RESULT.npz", "Write trajectory, precoders and rates."),
-    precoders: File = option("TABLE.csv", "Write the precoders by time and place."),
-    report: File = option("FILE.html", "Write a page about the flight."),
-    figure: File = option("FILE", "Draw the flight: .png, .svg or .pdf."),
-    upload: str | None = option("CONNECTION", "Upload the mission to a vehicle, and verify it."),
-    system: int | None = SYSTEM,
-    allow_armed: bool = ALLOW_ARMED,
-    force: bool = flag("--force", "Make the mission of a plan beyond the vehicle all the same."),
-    method: str | None = option("M", "Replace optimizer.method: direct or algorithm1."),
-    bound: bool = flag("--bound", "Also estimate what no route can exceed."),
-    as_json: bool = AS_JSON,
-    quiet: bool = flag("--quiet", "Print nothing but errors."),
-    verbose: bool = flag("--verbose", "Print how the flight was found, and every rate."),
+    out: cli.File = cli.option("MISSION", "Write the mission: .waypoints, .txt, .plan or .kml."),
+    save: cli.File = cli.option("RESULT.npz", "Write trajectory, precoders and rates."),
+    precoders: cli.File = cli.option("TABLE.csv", "Write the precoders by time and place."),
+    report: cli.File = cli.option("FILE.html", "Write a page about the flight."),
+    figure: cli.File = cli.option("FILE", "Draw the flight: .png, .svg or .pdf."),
+    upload: str | None = cli.option(
+        "CONNECTION", "Upload the mission to a vehicle, and verify it."
+    ),
+    system: int | None = cli.SYSTEM,
+    allow_armed: bool = cli.ALLOW_ARMED,
+    force: bool = cli.flag(
+        "--force", "Make the mission of a plan beyond the vehicle all the same."
+    ),
+    method: str | None = cli.option("M", "Replace optimizer.method: direct or algorithm1."),
+    bound: bool = cli.flag("--bound", "Also estimate what no route can exceed."),
+    as_json: bool = cli.AS_JSON,
+    quiet: bool = cli.flag("--quiet", "Print nothing but errors."),
+    verbose: bool = cli.flag("--verbose", "Print how the flight was found, and every rate."),
 ) -> None:
     """Optimise a radio-relay flight and write it as a MAVLink mission.
 
@@ -68,7 +61,7 @@ def plan(
     if force and not to_fly:
         raise InputError("--force: is for a mission; give --out MISSION or --upload CONNECTION too")
     plan = _checked_plan(plan_file, method, out, files, upload, force)
-    with optimizer_progress(shown=shown) as observe:
+    with cli.optimizer_progress(shown=shown) as observe:
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
             if path is not None:
@@ -91,7 +84,7 @@ def plan(
         except FaaoError as error:  # told after the result
             failure = error
     if not quiet or as_json:
-        show(
+        cli.show(
             lambda: result.as_dict() | {"upload": as_dict(uploaded) if uploaded else None},
             lambda: [
                 summary(result, written, precoders, verbose=verbose),
@@ -129,7 +122,7 @@ def _checked_plan(
         f"the {'parameters' if path.suffix.startswith('.param') else 'fence'} of --out,": path
         for path in beside
     }
-    check_outputs({"--out": out, **of_out, **files}, {"PLAN.yaml": plan_file})
+    cli.check_outputs({"--out": out, **of_out, **files}, {"PLAN.yaml": plan_file})
     if upload is not None:
         from faao_mav.wire.transport import parse_connection
 
@@ -147,7 +140,7 @@ def _sound(result: "Result") -> bool:
 
     errors = [finding for finding in result.findings if finding.level is Level.ERROR]
     for group in by_rule(errors):
-        note("; ".join(filter(None, (line_of(group), group[0].action))))
+        cli.note("; ".join(filter(None, (line_of(group), group[0].action))))
     if errors:
-        note("the mission does not pass validation; do not fly it")
+        cli.note("the mission does not pass validation; do not fly it")
     return not errors

@@ -5,16 +5,7 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from faao_mav.cli.shared import (
-    SIGNING_KEY,
-    File,
-    check_known,
-    flag,
-    note,
-    option,
-    read_numbers,
-    read_wind,
-)
+import faao_mav.cli.shared as cli
 from faao_mav.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,16 +35,18 @@ def app(
     plan_file: Path | None = typer.Argument(
         None, metavar="[PLAN.yaml]", help="The plan to begin with."
     ),
-    port: int = option(
+    port: int = cli.option(
         "N", "The port to serve at; 0: any that is free.", min=0, max=65535, default=0
     ),
-    host: str = option(
+    host: str = cli.option(
         "ADDRESS",
         "The address to serve at; not loopback: others can reach it.",
         default="127.0.0.1",
     ),
-    mbtiles: File = option("FILE", "A background map for the field: an MBTiles file of pictures."),
-    no_browser: bool = flag("--no-browser", "Only print the address."),
+    mbtiles: cli.File = cli.option(
+        "FILE", "A background map for the field: an MBTiles file of pictures."
+    ),
+    no_browser: bool = cli.flag("--no-browser", "Only print the address."),
 ) -> None:
     """Serve the planner page: drag stations, draw zones, see the flight.
 
@@ -72,11 +65,11 @@ def app(
     from faao_mav.app.serve import TileFile, serve
 
     tiles = None if mbtiles is None else TileFile(mbtiles)
-    serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=note)
+    serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=cli.note)
 
 
 def autopilot(
-    listen: str = option(
+    listen: str = cli.option(
         "CONNECTION",
         "Where ground stations find it: udpin:HOST:PORT, tcpin:HOST:PORT, or "
         "udpout:HOST:PORT to call one.",
@@ -85,23 +78,27 @@ def autopilot(
     kind: Literal["ardupilot", "px4"] = typer.Option(
         help="Whose manners it has.", default="ardupilot"
     ),
-    aircraft: str = option(
+    aircraft: str = cli.option(
         "NAME", "What it flies: a copter, or with ardupilot a plane.", "--type", default="copter"
     ),
-    system: int = option("N", "Its number.", min=1, max=255, default=1),
-    home: str = option(
+    system: int = cli.option("N", "Its number.", min=1, max=255, default=1),
+    home: str = cli.option(
         "LAT,LON,ALT", "Where it stands: degrees, m AMSL.", default="-35.363262,149.165237,584"
     ),
-    parameters: File = option("FILE", "Its parameters: it flies by them; without: defaults."),
-    wind: str | None = option("SPEED,FROM", "The wind that it flies in, m/s and degrees."),
-    speedup: float = option("X", "Fly X times as fast as predicted.", min=0.01, default=1.0),
-    boot: float = option("S", "Boot for S seconds.", min=0, default=0.0),
-    drop: float = option("P", "Lose packets, both ways.", min=0, max=1, default=0.0),
-    duplicate: float = option("P", "Repeat packets.", min=0, max=1, default=0.0),
-    corrupt: float = option("P", "Damage packets.", min=0, max=1, default=0.0),
-    delay: float = option("S", "Delay every other packet by up to S seconds.", min=0, default=0.0),
-    seed: int = option("N", "Of what the link does.", default=0),
-    signing_key: File = SIGNING_KEY,
+    parameters: cli.File = cli.option(
+        "FILE", "Its parameters: it flies by them; without: defaults."
+    ),
+    wind: str | None = cli.option("SPEED,FROM", "The wind that it flies in, m/s and degrees."),
+    speedup: float = cli.option("X", "Fly X times as fast as predicted.", min=0.01, default=1.0),
+    boot: float = cli.option("S", "Boot for S seconds.", min=0, default=0.0),
+    drop: float = cli.option("P", "Lose packets, both ways.", min=0, max=1, default=0.0),
+    duplicate: float = cli.option("P", "Repeat packets.", min=0, max=1, default=0.0),
+    corrupt: float = cli.option("P", "Damage packets.", min=0, max=1, default=0.0),
+    delay: float = cli.option(
+        "S", "Delay every other packet by up to S seconds.", min=0, default=0.0
+    ),
+    seed: int = cli.option("N", "Of what the link does.", default=0),
+    signing_key: cli.File = cli.SIGNING_KEY,
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
 
@@ -120,11 +117,11 @@ def autopilot(
     from faao_mav.wire.transport import open_transport
 
     wanted = f"--home {home}: expected LAT,LON,ALT, as in 47.397742,8.545594,488"
-    latitude, longitude, altitude = read_numbers(home, 3, wanted)
+    latitude, longitude, altitude = cli.read_numbers(home, 3, wanted)
     if abs(altitude) > _HIGHEST:
         raise InputError(f"--home {home}: expected an altitude of at most {_HIGHEST:g} m")
     values = {} if parameters is None else read_parameters(parameters)
-    check_known(None, aircraft)
+    cli.check_known(None, aircraft)
     behaviour = behaviour_of(kind)
     vehicle = Vehicle(behaviour.family.key, aircraft, values, str(parameters or "parameters"))
     vehicle.flight_model()  # useless parameters are refused here, not in flight
@@ -133,7 +130,7 @@ def autopilot(
         aircraft=aircraft,
         address=Address(system, 1),
         home=Home(latitude, longitude, altitude),
-        wind=read_wind(wind) or (0.0, 0.0),
+        wind=cli.read_wind(wind) or (0.0, 0.0),
         parameters=values,
         speedup=speedup,
         boot=boot,

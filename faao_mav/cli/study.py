@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from faao_mav.cli.shared import AS_JSON, File, note, option, progress, show
+import faao_mav.cli.shared as cli
 from faao_mav.errors import InputError, PlanError
 
 if TYPE_CHECKING:
@@ -21,18 +21,24 @@ _INTERRUPTED = 130
 
 def study(
     plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
-    vary: list[str] | None = option("KEY=VALUES", "start:stop:step or a,b,c; several make a grid."),
-    power: str | None = option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c."),
-    schemes: str | None = option("S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian."),
-    seeds: int | None = option("N", "Draws of the fading, from radio.seed.", min=1),
-    frontier: str | None = option(
+    vary: list[str] | None = cli.option(
+        "KEY=VALUES", "start:stop:step or a,b,c; several make a grid."
+    ),
+    power: str | None = cli.option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c."),
+    schemes: str | None = cli.option(
+        "S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian."
+    ),
+    seeds: int | None = cli.option("N", "Draws of the fading, from radio.seed.", min=1),
+    frontier: str | None = cli.option(
         "AXIS,data", "The most data for every AXIS: duration, power or energy."
     ),
-    points: int | None = option("N", "Points of the frontier; without it 12.", min=2),
-    jobs: int = option("N", "Processes; -1: one a core.", default=-1),
-    cluster: str | None = option("ADDRESS", "A Dask scheduler, tcp://host:port, not processes."),
-    out: File = option("DIR", "Keep rows there as they finish; go on where it ended."),
-    as_json: bool = AS_JSON,
+    points: int | None = cli.option("N", "Points of the frontier; without it 12.", min=2),
+    jobs: int = cli.option("N", "Processes; -1: one a core.", default=-1),
+    cluster: str | None = cli.option(
+        "ADDRESS", "A Dask scheduler, tcp://host:port, not processes."
+    ),
+    out: cli.File = cli.option("DIR", "Keep rows there as they finish; go on where it ended."),
+    as_json: bool = cli.AS_JSON,
 ) -> None:
     """Optimise a plan with many values, schemes and seeds, and compare.
 
@@ -84,7 +90,7 @@ def study(
     else:
         raise refused[0]
     try:
-        with progress(shown=sys.stderr.isatty()) as draw:
+        with cli.progress(shown=sys.stderr.isatty()) as draw:
             done = itertools.count(1)
 
             def observe(row: "StudyRow") -> None:
@@ -95,11 +101,11 @@ def study(
         kept = "nothing was kept; give --out DIR to go on where it ended"
         if out is not None:
             kept = f"finished rows are in {out}; the same command goes on there"
-        note(f"interrupted; {kept}")
+        cli.note(f"interrupted; {kept}")
         raise typer.Exit(_INTERRUPTED) from None
     written = _draw(rows, plan, along, out) if out is not None else []
     text = frontier_table(rows, plan, along) if along else comparison(rows)
-    show(
+    cli.show(
         lambda: {"rows": [as_dict(row) for row in rows], "written": list(map(str, written))},
         lambda: [text, *(f"written      {path}" for path in written)],
         as_json=as_json,

@@ -7,39 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from faao_mav.cli.shared import (
-    ALLOW_ARMED,
-    AS_JSON,
-    VEHICLE,
-    File,
-    check_outputs,
-    flag,
-    note,
-    option,
-    progress,
-    read_noted,
-    show,
-    with_link,
-    write_noted,
-)
+import faao_mav.cli.shared as cli
 
 if TYPE_CHECKING:
     from faao_mav.mission.item import Mission
     from faao_mav.wire.jobs import UploadReport
 
 
-@with_link
+@cli.with_link
 def upload(
     mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
-    to: str = option("CONNECTION", VEHICLE, default=...),
-    parameters: File = option(
+    to: str = cli.option("CONNECTION", cli.VEHICLE, default=...),
+    parameters: cli.File = cli.option(
         "FILE", "Set the parameters that MISSION is timed for, first, and read them back."
     ),
-    clear_rest: bool = flag(
+    clear_rest: bool = cli.flag(
         "--clear-rest", "Clear a fence and rally points that MISSION does not have."
     ),
-    as_json: bool = AS_JSON,
-    allow_armed: bool = ALLOW_ARMED,
+    as_json: bool = cli.AS_JSON,
+    allow_armed: bool = cli.ALLOW_ARMED,
     *,
     link: dict[str, Any],
 ) -> None:
@@ -56,7 +42,7 @@ def upload(
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.wire.parameters import check_settable
 
-    file = read_noted(mission_file)
+    file = cli.read_noted(mission_file)
     values = None if parameters is None else read_parameters(parameters)
     check_settable(values or (), parameters)
     report = send(
@@ -69,7 +55,7 @@ def upload(
         clear_rest=clear_rest,
         **link,
     )
-    show(lambda: as_dict(report), lambda: [str(report)], as_json=as_json)
+    cli.show(lambda: as_dict(report), lambda: [str(report)], as_json=as_json)
     if not report.verified:
         raise typer.Exit(1)
 
@@ -78,10 +64,10 @@ def send(mission: "Mission", to: str, *, shown: bool, **options: Any) -> "Upload
     """Upload a mission and verify it, with progress where that is `shown`; see `upload` there."""
     from faao_mav.wire.client import upload as run
 
-    with progress(shown=shown) as observe:
+    with cli.progress(shown=shown) as observe:
         report = run(mission, to, observe=observe, **options)
     if not report.verified:
-        note("the mission is not verified; do not fly it")
+        cli.note("the mission is not verified; do not fly it")
     return report
 
 
@@ -124,10 +110,10 @@ def _plain(value: Any) -> Any:
     return None if value != value else value
 
 
-@with_link
+@cli.with_link
 def download(
-    source: str = option("CONNECTION", VEHICLE, "--from", default=...),
-    out: Path = option("MISSION", "Write the mission.", default=...),
+    source: str = cli.option("CONNECTION", cli.VEHICLE, "--from", default=...),
+    out: Path = cli.option("MISSION", "Write the mission.", default=...),
     *,
     link: dict[str, Any],
 ) -> None:
@@ -144,12 +130,12 @@ def download(
     from faao_mav.wire.client import holdings
 
     check_suffix(out)
-    check_outputs({"--out": out}, {})
-    with progress(shown=sys.stderr.isatty()) as observe:
+    cli.check_outputs({"--out": out}, {})
+    with cli.progress(shown=sys.stderr.isatty()) as observe:
         held = holdings(source, observe=observe, **link)
     found, mission = held.vehicle, held.mission
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
-    written = write_noted(mission, out, target)
+    written = cli.write_noted(mission, out, target)
     told = {
         "fence": f"{len(mission.fence.areas)} fence areas",
         "rally points": f"{len(mission.rally)} rally points",
@@ -160,6 +146,6 @@ def download(
     for path in written.contents:
         typer.echo(f"written      {path}")
     for problem in held.problems:
-        note(problem)
+        cli.note(problem)
     if held.problems:
         raise typer.Exit(1)
