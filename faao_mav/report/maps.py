@@ -15,19 +15,7 @@ from faao_mav.mission.fence_area import areas_of
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.report.style import (
-    INK,
-    MUTED,
-    SERIES,
-    SPEEDS,
-    WIDTH,
-    colour_bar,
-    drawing,
-    label,
-    legend_above,
-    mark_stations,
-    write_beside,
-)
+from faao_mav.report import style
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.schedule.transit import way_home, way_out
@@ -63,24 +51,26 @@ def route_map(
     if plan.keep_in is not None and plan.fence is not None:
         for edge in plan.keep_in.inside(plan.fence.margin).edges():
             name = f"margin {plan.fence.margin:g} m"
-            plot.plot(*edge.T, ":", color=MUTED, linewidth=0.9, label=name)
+            plot.plot(*edge.T, ":", color=style.MUTED, linewidth=0.9, label=name)
     _coloured(plot, solution)
     seen, numbers = [solution.w, *stations], []
     if flown is not None:
         seen.append(flown.w)
-        plot.plot(*flown.w.T, color=SERIES[1], linewidth=1.6, label="flown")
+        plot.plot(*flown.w.T, color=style.SERIES[1], linewidth=1.6, label="flown")
     if conversion is not None:
         seen.append(conversion.schedule.track()["predicted_w"])
-        plot.plot(*seen[-1].T, "--", color=INK, linewidth=0.9, label="predicted")
+        plot.plot(*seen[-1].T, "--", color=style.INK, linewidth=0.9, label="predicted")
         for way in _ways(plan, conversion) if outlines else ():
             seen.append(way)
-            plot.plot(*way.T, color=MUTED, linewidth=0.9, label="from and to home")
+            plot.plot(*way.T, color=style.MUTED, linewidth=0.9, label="from and to home")
         numbers = _draw_items(plot, conversion.mission, frame, WAYPOINTS, "waypoint")
         seen += [place[np.newaxis] for _, place in numbers]
     if any(station.moves for station in plan.radio.stations):  # its way is drawn with its mark
-        plot.plot([], [], color=INK, linewidth=1.0, label="station moves")
+        plot.plot([], [], color=style.INK, linewidth=1.0, label="station moves")
     _show_all(plot, np.concatenate(seen), outlines)
-    mark_stations(plot, list(zip(("base station", "user"), stations, "s^", strict=True)), numbers)
+    style.mark_stations(
+        plot, list(zip(("base station", "user"), stations, "s^", strict=True)), numbers
+    )
 
 
 def mission_map(mission: Mission, track: Track) -> "Figure":
@@ -89,14 +79,14 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
     East and north in metres about the origin of the track's frame; items count from 1.
     """
     flown = track.position[:, :2]
-    with drawing(WIDTH, 4.2) as figure:
+    with style.drawing(style.WIDTH, 4.2) as figure:
         plot = figure.subplots()
         outlines = _draw_fence(plot, mission.fence, track.frame)
-        plot.plot(*flown.T, color=SERIES[0], label="predicted")
+        plot.plot(*flown.T, color=style.SERIES[0], label="predicted")
         numbers = _draw_items(plot, mission, track.frame, FLOWN_TO, "item")
         places = [place[np.newaxis] for _, place in numbers]
         _show_all(plot, np.concatenate([flown, *places]), outlines)
-        write_beside(plot, numbers)
+        style.write_beside(plot, numbers)
     return figure
 
 
@@ -115,11 +105,11 @@ def _draw_fence(plot: "Axes", fence: Fence, frame: LocalFrame) -> list[Real]:
     """Draw and return the outlines (k, 2), m: dashed to stay inside of, filled to stay out of."""
     outlines = []
     for area in areas_of(fence, frame):
-        colour, style = (MUTED, "--") if area.inclusion else (SERIES[5], "-")
+        colour, line = (style.MUTED, "--") if area.inclusion else (style.SERIES[5], "-")
         name = "stay inside" if area.inclusion else "stay out"
         for ring in area.rings():
             outlines.append(ring)
-            plot.plot(*ring.T, style, color=colour, linewidth=1.2, label=name)
+            plot.plot(*ring.T, line, color=colour, linewidth=1.2, label=name)
             if not area.inclusion:
                 plot.fill(*ring.T, color=colour, alpha=0.15, linewidth=0)
     return outlines
@@ -146,8 +136,8 @@ def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real]) -> None:
     plot.set_aspect("equal", adjustable="datalim")
     plot.dataLim.set_points(np.array([low, high]))
     plot.margins(0.08)
-    label(plot, "", "east, m", "north, m")
-    legend_above(plot, 2)
+    style.label(plot, "", "east, m", "north, m")
+    style.legend_above(plot, 2)
 
 
 def _coloured(plot: "Axes", solution: Solution) -> None:
@@ -160,13 +150,13 @@ def _coloured(plot: "Axes", solution: Solution) -> None:
     pieces = [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
     speeds = lengths(solution.v)
     means = np.array([speeds[piece].mean() for piece in pieces])
-    colours = LinearSegmentedColormap.from_list("speeds", SPEEDS, _LEVELS)
+    colours = LinearSegmentedColormap.from_list("speeds", style.SPEEDS, _LEVELS)
     route = [solution.w[piece] for piece in pieces]
     lines = LineCollection(route, cmap=colours, linewidths=5, capstyle="round")
     lines.set_array(means)
     lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
     plot.add_collection(lines)
-    colour_bar(plot, lines, "planned speed, m/s", 0.7)
+    style.colour_bar(plot, lines, "planned speed, m/s", 0.7)
 
 
 def _draw_items(
@@ -177,5 +167,5 @@ def _draw_items(
         (str(number), frame.to_local(*place)) for number, place in placed_items(mission, commands)
     ]
     places = np.reshape([place for _, place in found], (-1, 2))
-    plot.plot(*places.T, ".", color=INK, markersize=4, linestyle="none", label=name)
+    plot.plot(*places.T, ".", color=style.INK, markersize=4, linestyle="none", label=name)
     return found
