@@ -203,10 +203,7 @@ def _gains(
 
 
 def _flights(
-    path: Path,
-    station: Sequence[float],
-    units: Mapping[str, str],
-    calibration: "Calibration",
+    path: Path, station: Sequence[float], units: Mapping[str, str], calibration: "Calibration"
 ) -> Iterator[tuple["Samples", str]]:
     """Yield the flights in a table or log, and the unit of what was measured."""
     import numpy as np

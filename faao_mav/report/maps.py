@@ -33,10 +33,7 @@ _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
 
 
 def route_map(
-    solution: Solution,
-    conversion: Conversion | None,
-    plot: "Axes",
-    flown: Prediction | None = None,
+    solution: Solution, conversion: Conversion | None, plot: "Axes", flown: Prediction | None = None
 ) -> None:
     """Draw the map on `plot`, whose figure has all else: speeds as colours with a bar.
 
