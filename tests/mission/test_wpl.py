@@ -132,7 +132,7 @@ def test_files_by_their_ending_the_fence_of_text_files_beside_them(tmp_path: Pat
             loader = loaded(beside)
             rows = [loader.wp(k) for k in range(loader.count())]
             assert [row.command for row in rows] == [16, 5000, *[5001] * 3, *[5002] * 3, 5004]
-            assert (rows[2].param1, rows[8].param1) == (3.0, 40.5)
+            assert [rows[k].param1 for k in (1, 2, 8)] == [0.0, 3.0, 40.5]
 
 
 def test_what_mission_planner_saves_is_read() -> None:

@@ -8,6 +8,7 @@ from conftest import SMALL, edited
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
@@ -15,7 +16,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import price_flight
 from faao_mav.schedule.schedule import positions_at
-from faao_mav.validate.comparison import predicted_line
+from faao_mav.validate.comparison import compare_with_plan, predicted_line
 from faao_mav.validate.flown import FlightRecord, Line, debriefing, plan_start, standing
 
 CHANGES = {
@@ -32,8 +33,16 @@ CHANGES = {
 
 
 @cache
-def solved(start: str = "hover") -> Solution:
-    return optimize(parse_plan(edited(SMALL, CHANGES | {"flight.start_velocity": start})))
+def solved(start: str = "hover", causal: bool = True) -> Solution:
+    changes = CHANGES | {"flight.start_velocity": start, "radio.causal": causal}
+    return optimize(parse_plan(edited(SMALL, changes)))
+
+
+def track(solution: Solution, t: Real, w: Real, reached: Real) -> Track:
+    """Return the flight through `w` (n, 2) at 40 m as a predicted one."""
+    frame = LocalFrame(solution.plan.origin.latitude, solution.plan.origin.longitude)
+    place = np.column_stack([w, np.full(len(t), 40.0)])
+    return Track(t, place, 0 * place, np.zeros(len(t), dtype=int), reached, frame)
 
 
 def flown(
@@ -96,16 +105,26 @@ def test_flights_by_setpoints_and_what_is_not_the_flight() -> None:
 
 def test_the_clock_of_a_prediction_is_that_of_its_departure() -> None:
     """Not that of an item near w_I behind it: the flight comes by there once more on its end."""
-    solution, origin = solved(), solved().plan.origin
+    solution = solved()
     flight = flown(solution, 200.0)
     t = np.append(flight.t, flight.t[-1] + np.arange(1.0, 60.0))
     w = np.vstack([flight.w, np.linspace(flight.w[-1], solution.w[0], 59)])
-    n, place = len(t), np.column_stack([w, np.full(len(t), 40.0)])
-    frame = LocalFrame(origin.latitude, origin.longitude)
-    reached = np.array([200.0, 245.0, t[-1]])
-    track = Track(t, place, 0 * place, np.zeros(n, dtype=int), reached, frame)
-    found = predicted_line(solution, track)
+    found = predicted_line(solution, track(solution, t, w, np.array([200.0, 245.0, t[-1]])))
     assert t[0] - found.t[0] == pytest.approx(200.0, abs=0.15)
+
+
+@pytest.mark.parametrize("causal", [True, False])
+def test_the_stretch_that_costs_most_is_told(causal: bool) -> None:
+    """From 10 to 15 s it flies 20 m to the left, and all that is lost is lost then."""
+    solution = solved("free", causal)
+    w, v = solution.w.copy(), solution.v[20:30]
+    w[20:30] += 20.0 * np.stack([-v[:, 1], v[:, 0]], axis=1) / np.hypot(*v.T)[:, None]
+    link, _ = compare_with_plan(solution, track(solution, solution.t, w, solution.t[-1:]))
+    assert link.worst is not None
+    assert link.worst.start <= 10.0
+    assert link.worst.end == pytest.approx(15.0)
+    lost = link.planned_delivered - link.predicted_delivered
+    assert link.worst.rate_lost == pytest.approx(lost, rel=1e-6)
 
 
 def test_what_became_of_it_is_priced_as_a_prediction_is() -> None:
