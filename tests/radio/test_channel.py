@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.radio.channel import (
+    balanced_rayleigh,
     line_of_sight_ula,
     rayleigh,
     rician,
@@ -51,6 +52,9 @@ def test_rayleigh_has_unit_power_and_repeats() -> None:
     assert np.mean(np.abs(H) ** 2) == pytest.approx(1.0, abs=0.02)
     assert abs(np.mean(H**2)) < 0.02  # circular
     np.testing.assert_array_equal(H, rayleigh(np.random.default_rng(3), 5000, 2, 3))
+    few = balanced_rayleigh(np.random.default_rng(3), 4, 2, 3)
+    assert np.abs(few.mean(axis=0)).max() < 1e-12
+    assert np.mean(np.abs(few) ** 2) == pytest.approx(1.0)
 
 
 def test_rician_limits() -> None:

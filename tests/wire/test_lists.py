@@ -18,6 +18,7 @@ from faao_mav.wire.messages import (
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
+    Statustext,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 from faao_mav.wire.questions import Pace, Questions
@@ -62,6 +63,28 @@ def test_a_vehicle_that_gets_no_further_is_given_up_and_told(firmware: str) -> N
             assert desk.now < 200
         assert desk.sent[-1] == CANCEL
         assert (desk.machine.outcome.verdict, desk.machine.outcome.item) == ("silent", 0)
+
+
+def test_the_last_words_of_a_vehicle_are_told() -> None:
+    desk = uploading("ardupilot")
+    for k in range(7):
+        desk.tell(Statustext(4, f"no {k}"))
+    desk.tell(ack(MavResult.INVALID))
+    desk.wait(2.0)
+    assert desk.machine.outcome.said == ("no 2", "no 3", "no 4", "no 5", "no 6")
+
+
+def test_a_talk_waits_for_its_time_and_keeps_its_outcome() -> None:
+    def knock() -> Talk[str]:
+        line = yield AT_ONCE
+        line = yield line.now + 2.0
+        return f"nobody until {line.now}"
+
+    script = Script(knock())
+    script.start(1.0)
+    for now, outcome in ((2.9, None), (3.0, "nobody until 3.0"), (9.0, "nobody until 3.0")):
+        script.tick(now)
+        assert script.outcome == outcome
 
 
 def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
