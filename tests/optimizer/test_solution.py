@@ -148,9 +148,10 @@ def test_an_archive_that_unpacks_to_any_size_is_refused(
         tracemalloc.stop()
 
 
-def test_a_directory_without_an_end_is_not_read(tmp_path: Path) -> None:
+def test_a_directory_without_an_end_is_not_read(solution: Solution, tmp_path: Path) -> None:
     path = tmp_path / "result.npz"
-    with zipfile.ZipFile(path, "w") as packed:
+    save_solution(solution, path)
+    with zipfile.ZipFile(path, "a") as packed:
         for number in range(3000):
             packed.writestr(f"{number}.npy", b"")
     with pytest.raises(InputError, match="not a result of faao-mission --save"):
