@@ -39,6 +39,7 @@ def test_unit_energy_and_zero_mean(modulation: str) -> None:
     assert np.mean(np.abs(symbols) ** 2) == pytest.approx(1.0, abs=1e-14)
     assert abs(symbols.mean()) < 1e-14
     assert len(np.unique(np.round(symbols, 9))) == len(symbols)
+    assert not symbols.flags.writeable  # all are given the same array
 
 
 @pytest.mark.parametrize(
@@ -52,6 +53,8 @@ def test_every_pair_is_counted_once(modulation: str, antennas: int) -> None:
     assert classes.weight.sum() == pytest.approx(1.0 - 1.0 / classes.symbols)
     assert classes.bits == pytest.approx(np.log2(classes.symbols))
     assert len(classes.vectors) < difference_vector_count(modulation, antennas)
+    for shared in (classes.vectors, classes.multiplicity):
+        assert not shared.flags.writeable
 
 
 @pytest.mark.parametrize(("modulation", "antennas"), ENUMERABLE)
