@@ -23,6 +23,10 @@ def test_pieces_are_convex_and_make_up_the_polygon(polygon: shapely.Polygon) -> 
     for piece in pieces:
         assert piece.convex_hull.area == pytest.approx(piece.area, rel=1e-9)
         assert piece.exterior.is_ccw
+    corners = shapely.get_coordinates(shapely.orient_polygons(polygon))[:-1]
+    before, after = (np.roll(corners, k, axis=0) - corners for k in (1, -1))
+    inward = int(np.sum(after[:, 0] * before[:, 1] < after[:, 1] * before[:, 0]))
+    assert len(pieces) <= 2 * inward + 1  # Hertel and Mehlhorn's bound
 
 
 @given(zones=st.lists(polygons, min_size=1, max_size=3))

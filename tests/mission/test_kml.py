@@ -1,6 +1,7 @@
 """KML for Google Earth, read back as XML."""
 
 import math
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree as Xml
 
@@ -49,10 +50,12 @@ def test_route_and_waypoints() -> None:
 
 def test_without_the_height_of_home_heights_are_above_the_ground() -> None:
     for home in (None, Home(47.0, 8.0, math.nan)):
-        mission = Mission((WAYPOINT, WAYPOINT), home)
+        mission = Mission((WAYPOINT, replace(WAYPOINT, z=math.nan), WAYPOINT), home)
         assert texts(parsed(mission), "k:LineString/k:altitudeMode") == ["relativeToGround"]
         (line,) = texts(parsed(mission), "k:LineString/k:coordinates")
         assert places(line) == [(8.002, 47.001, 50.0)] * 2
+    nowhere = parsed(Mission((TAKEOFF, WAYPOINT)))  # the take-off would be at home
+    assert texts(nowhere, "k:Placemark/k:name") == ["2"]
 
 
 def test_a_fence_is_drawn_with_its_holes_and_circles() -> None:
@@ -74,6 +77,8 @@ def test_any_name_gives_xml(name: str) -> None:
 
 
 def test_what_kml_cannot_hold_is_told() -> None:
-    assert render_files(MISSION, "x.kml").lost == (
+    nan = MissionItem(16, 10, (0.0, 0.0, 0.0, math.nan), 1.0, 2.0, 3.0)
+    mission = Mission((nan, *MISSION.items), HOME, Fence(circles=(Circle((0.0, 0.0), 1.0, True),)))
+    assert render_files(mission, "x.kml").lost == (
         "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back",
     )
