@@ -16,6 +16,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import price_flight
 from faao_mav.schedule.schedule import positions_at
+from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.comparison import compare_with_plan, predicted_line
 from faao_mav.validate.flown import FlightRecord, Line, debriefing, plan_start, standing
 
@@ -111,6 +112,11 @@ def test_the_clock_of_a_prediction_is_that_of_its_departure() -> None:
     w = np.vstack([flight.w, np.linspace(flight.w[-1], solution.w[0], 59)])
     found = predicted_line(solution, track(solution, t, w, np.array([200.0, 245.0, t[-1]])))
     assert t[0] - found.t[0] == pytest.approx(200.0, abs=0.15)
+    # No departure of this one is like it: it is first near [0, 120] on its way to [30, 150].
+    t, w = flight.t, flight.w + 30.0
+    near = t[np.argmax(w[:, 1] > 108.9)]  # within 32 m, which is 2 m more than it is at [30, 120]
+    found = predicted_line(solution, track(solution, t, w, np.array([200.0])))
+    assert t[0] - found.t[0] == pytest.approx(near, abs=MOST_LEAD + 0.2)
 
 
 @pytest.mark.parametrize("causal", [True, False])
