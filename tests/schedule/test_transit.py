@@ -52,6 +52,8 @@ def test_a_mission_goes_around_what_lies_between_home_and_the_route(autopilot: s
     assert area.clearance(track.position[:, :2]) > 2
     corners = [item for item in mission.items if item.command == 16 and item.params[0] == 1.0]
     assert 3 <= len(corners) <= 6  # the aircraft stops at each
+    speeds = [item.params[1] for item in mission.items if item.command == 178]
+    assert speeds[0] == speeds[-1] == 10.0 > max(speeds[1:-1])  # slower on the route alone
 
 
 def test_a_way_that_is_not_needed_is_not_there() -> None:
