@@ -13,7 +13,7 @@ from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import rate_models
-from faao_mav.optimizer.rates.slot_rate import FixedRate, SlotRate, unturned
+from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import TableRate
 
 FARTHEST = 400.0
@@ -44,32 +44,6 @@ def derivatives(link: Link, rate: RateModel, w: Real) -> tuple[Real, Real]:
     at = link_coordinates(link, w.T)
     gradient, hessian = at.by_position(rate.partials(at.gain_log, at.cosine))
     return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
-
-
-@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
-@pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
-@pytest.mark.parametrize("hop", [0, 1])
-def test_fixed_precoders(
-    small_plan: MakePlan, line_of_sight: str, modulation: str, hop: int
-) -> None:
-    changes = {"radio.line_of_sight": line_of_sight, "radio.modulation": modulation}
-    link = build_problem(small_plan(changes | {"radio.fading": "realization"})).links[hop]
-    rng = np.random.default_rng(1)
-    P = rng.standard_normal((20, 2, 2)) + 1j * rng.standard_normal((20, 2, 2))
-    P *= np.sqrt(link.power) / np.linalg.norm(P, axis=(1, 2), keepdims=True)
-    w = places(link)
-
-    def rate(at: Real) -> Real:
-        """The rate of precoders that turn with the line of sight from w on."""
-        first = link.line_of_sight_at(coordinates(link, w)[1])[:, 0]
-        then = link.line_of_sight_at(coordinates(link, at)[1])[:, 0]
-        moved = (first * np.conj(then))[:, :, None] * P
-        return link.rates(at, link.small_scale(at), moved)
-
-    fixed = FixedRate(link, unturned(link, coordinates(link, w)[1], P))
-    gradient, hessian = derivatives(link, fixed, w)
-    assert gradient == pytest.approx(gradient_by_differences(rate, w), rel=1e-4, abs=1e-7)
-    assert hessian == pytest.approx(hessian_by_differences(rate, w), rel=1e-3, abs=1e-6)
 
 
 @pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])

@@ -10,7 +10,7 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 
 A rate model (``RateModel``) therefore works with l and u, and ``LinkCoordinates`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
-three models:
+two models:
 
 ====================  ==================================  =========================================
 model                 fading, precoders                   method
@@ -18,9 +18,8 @@ model                 fading, precoders                   method
 ``TableRate``         none or averaged over; known per    spline over l + shift and a second
                       slot, best precoders, two modes     coordinate, tables are kept
                       at most
-``SlotRate``          known per slot, more modes, or a    the precoders of every slot; envelope
-                      classical scheme                    theorem, or central differences
-``FixedRate``         given precoders                     exact slopes, differences of these
+``SlotRate``          known per slot, more modes, or a    the precoders of every slot; central
+                      classical scheme                    differences
 ====================  ==================================  =========================================
 
 To change which model a plan gets, or to add one: write a class with ``value`` and ``partials`` and

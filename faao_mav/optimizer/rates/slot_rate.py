@@ -1,7 +1,6 @@
 """Rates of links whose fading is known slot by slot."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,10 +8,6 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.problem import Link
 from faao_mav.optimizer.rates import RatePartials
-from faao_mav.radio.constellation import coordinates
-from faao_mav.radio.rate import class_sum
-
-_LN2 = float(np.log(2.0))
 
 _STEP = 1e-3
 """Step of l and u in central differences: derivatives of rates of a few bits err by about 1e-5."""
@@ -21,10 +16,10 @@ _STEP = 1e-3
 class SlotRate:
     """The rate that counts at the precoders of `design`, made for every slot at every call.
 
-    For the best ones the gradient is that at fixed precoders, by the envelope theorem, and the
-    Hessian that of `FixedRate`, which never exceeds the true one; each search starts from the
-    precoders of the last call. Those of a classical scheme follow the channel by a rule of their
-    own, and the derivatives are central differences.
+    Its derivatives are central differences. Precoders of a classical scheme follow the channel by a
+    rule of their own. The best ones are held fixed, but for turning with the line of sight: by the
+    envelope theorem the gradient is then exact, and the Hessian never exceeds the true one. Each
+    search starts from the precoders of the last call.
     """
 
     def __init__(self, link: Link, design: Design) -> None:
@@ -38,20 +33,29 @@ class SlotRate:
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
         """Return the rate and its derivatives by l and u, bits (..., n)."""
-        if not self.design.optimal:
-            both = self.link.follows_position
-            return by_differences(self.value, gain_log, cosine, both=both)
-        P = self._precoders(self._channel(gain_log, cosine))
-        return FixedRate(self.link, unturned(self.link, cosine, P)).partials(gain_log, cosine)
+        rate = self.value
+        if self.design.optimal:
+            P = self.initial_precoders(gain_log, cosine)
+            steering = self._steering(cosine)
+
+            def rate(gain_log: Real, cosine: Real) -> Real:
+                turned = self._steering(cosine).conj() * steering * P
+                return self.link.draw_rates(self._channel(gain_log, cosine), turned)
+
+        return _by_differences(rate, gain_log, cosine, both=self.link.follows_position)
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
         """Return the precoders (..., n, N_t, N_t) at l and u (..., n)."""
         return self._precoders(self._channel(gain_log, cosine))
 
     def _channel(self, gain_log: Real, cosine: Real) -> Complex:
-        """Return H = e^(l/2) H_r of (1) or (2), (..., n, N_r, N_t), at l and u (..., n)."""
+        """Return H of (1) or (2), (..., n, N_r, N_t), at l and u (..., n)."""
         H_r = self.link.fade(self.link.line_of_sight_at(cosine))
         return np.asarray(np.exp(gain_log / 2)[..., None, None] * H_r)
+
+    def _steering(self, cosine: Real) -> Complex:
+        """Return the phases (..., n, N_t, 1) of the transmitting array at u (..., n)."""
+        return self.link.line_of_sight_at(cosine)[..., 0, :, None]
 
     def _precoders(self, H: Complex) -> Complex:
         near = self._last if self.design.optimal else None
@@ -63,77 +67,7 @@ class SlotRate:
         return P
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FixedRate:
-    """The rate that counts at precoders P(u) = D(u) Q, which turn with the line of sight.
-
-    D has the steering phases of the transmitting array, none with a line of sight of ones; `Q`
-    (..., n, N_t, N_t) is that which `unturned` gives.
-    """
-
-    link: Link
-    Q: Complex
-
-    def value(self, gain_log: Real, cosine: Real) -> Real:
-        """Return the rate R of every slot, bits (n,)."""
-        H_r = self.link.fade(self.link.line_of_sight_at(cosine))
-        H = np.exp(gain_log / 2)[..., None, None] * H_r
-        return self.link.draw_rates(H, self.initial_precoders(gain_log, cosine))
-
-    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:  # noqa: ARG002
-        """Return P (..., n, N_t, N_t) at u (..., n)."""
-        return np.asarray(self.link.line_of_sight_at(cosine)[..., 0, :, None].conj() * self.Q)
-
-    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives by l and u, bits (n,).
-
-        Those of the mutual information are differences. The cutoff rate has exact slopes, whose
-        differences are the second derivatives.
-        """
-        follows = self.link.follows_position
-        if self.link.measure != "cutoff":
-            return by_differences(self.value, gain_log, cosine, both=follows)
-        h = _STEP
-        by_l, by_u = self._slopes(gain_log, cosine)
-        (l_up, u_up), (l_down, u_down) = (self._slopes(gain_log + d, cosine) for d in (h, -h))
-        value, by_ll = self.value(gain_log, cosine), (l_up - l_down) / (2 * h)
-        if not follows:
-            return RatePartials(value, by_l, by_ll)
-        right, left = (self._slopes(gain_log, cosine + d)[1] for d in (h, -h))
-        by_lu, by_uu = (u_up - u_down) / (2 * h), (right - left) / (2 * h)
-        return RatePartials(value, by_l, by_ll, by_u, by_lu, by_uu)
-
-    def _slopes(self, gain_log: Real, cosine: Real) -> tuple[Real, Real]:
-        """Return the derivatives of the cutoff rate by l and u, bits (n,).
-
-        With D_k = φ_k z the exponents, linear in the coordinates z of Z = P^H H^H H P / (4 σ²), and
-        weights over all classes but zero that have the mean m and the part p of all classes' sum,
-        they are p m z_a / ln 2; z and its derivative by l are one. H^LoS = D_r 1 1^T D^H with
-        steering phases D_r, so that the rate at P = D Q is that at Q of D_r^H H_r D, of which only
-        the scattered part depends on u.
-        """
-        link = self.link
-        los = link.line_of_sight_at(cosine)
-        scale = np.sqrt(np.exp(gain_log) / (4 * link.noise))[..., None, None]
-        H = np.conj(los) * link.fade(los)
-        sign = 1 if link.to_relay else -1
-        phase = 1j * np.pi * sign * (np.arange(link.receive)[:, None] - np.arange(link.transmit))
-        A, A_u = (scale * (M @ self.Q) for M in (H, phase * (H - link.los_share)))
-        z = coordinates(A.conj().mT @ A)
-        crossed = A.conj().mT @ A_u
-        z_u = coordinates(crossed + crossed.conj().mT)
-        s, mean = class_sum(link.classes).moments(z.reshape(-1, z.shape[-1]))
-        part = np.exp(-np.logaddexp(0.0, -s)).reshape(z.shape[:-1]) / _LN2
-        mean = mean.reshape(z.shape)
-        return part * np.sum(mean * z, axis=-1), part * np.sum(mean * z_u, axis=-1)
-
-
-def unturned(link: Link, cosine: Real, P: Complex) -> Complex:
-    """Return Q = D(u)^H P of precoders P (..., n, N_t, N_t) at u (..., n)."""
-    return np.asarray(link.line_of_sight_at(cosine)[..., 0, :, None] * P)
-
-
-def by_differences(
+def _by_differences(
     rate: Callable[[Real, Real], Real], gain_log: Real, cosine: Real, *, both: bool
 ) -> RatePartials:
     """Return `rate` at l and u with central differences by l, and by u too if `both`."""
