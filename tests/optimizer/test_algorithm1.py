@@ -8,7 +8,7 @@ from conftest import MISSIONS, MakePlan
 
 from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer import algorithm1 as module
-from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
+from faao_mav.optimizer.algorithm1 import optimize_precoders
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Progress
 from faao_mav.plan import read_plan

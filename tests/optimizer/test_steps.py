@@ -7,10 +7,10 @@ import pytest
 from closed_forms import bpsk_two_antennas_rate
 from conftest import MakePlan
 
-from faao_mav.optimizer.algorithm1.precoder_step import optimize_precoders
-from faao_mav.optimizer.algorithm1.trajectory_step import (
+from faao_mav.optimizer.algorithm1 import (
     SumOfExponentials,
     link_sum,
+    optimize_precoders,
     optimize_trajectory,
     xi,
 )
