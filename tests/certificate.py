@@ -69,10 +69,10 @@ def _forwarded(
 def _within(limit: EnergyLimit, now: Trajectory, flight: FlightVariables) -> Any:
     """Return that `flight` keeps the energy `limit`, to first order about `now`."""
     kin, power = flight.kinematics, limit.partials(now.v.T, now.a.T)
-    left = limit.most / limit.time_step - float(power.value.sum())
+    left = limit.most / kin.time_step - float(power.value.sum())
     by_v = cp.sum(cp.multiply(power.by_v.T, flight.v * kin.max_speed - now.v))
     by_a = cp.sum(cp.multiply(power.by_a.T, flight.a * kin.max_acceleration - now.a))
-    unit = limit.most / limit.time_step
+    unit = limit.most / kin.time_step
     return (by_v + by_a) / unit <= max(0.0, left) / unit
 
 

@@ -127,7 +127,7 @@ def _precoders_at(problem: Problem, flight: Trajectory, last: Sequence[Complex])
     """Return the precoders of both links at `flight`: the plan's scheme, or (35) from `last`."""
     scheme, found = SCHEMES.get(problem.plan.optimizer.precoder), []
     for link, P in zip(problem.links, last, strict=True):
-        H = link.channel(flight.w, link.small_scale(flight.w))
+        H = link.channel(flight.w)
         found.append(
             scheme(H, link.power, link.noise) if scheme else optimize_precoders(link, H, P)
         )

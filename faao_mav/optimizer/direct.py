@@ -274,7 +274,7 @@ def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
 
 def _designed(problem: Problem, scheme: Design, w: Real) -> list[Complex]:
     """Return the precoders of both links at w (n, 2) by `scheme`."""
-    return [scheme.precoders(link, link.channel(w, link.small_scale(w))) for link in problem.links]
+    return [scheme.precoders(link, link.channel(w)) for link in problem.links]
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
@@ -282,7 +282,7 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
 
     With known draws they are searched afresh too, and the better kept.
     """
-    H = link.channel(w, link.small_scale(w))
+    H = link.channel(w)
     at = link_coordinates(link, w.T)
     near = rate.initial_precoders(at.gain_log, at.cosine) if scheme.optimal else None
     if near is None:

@@ -157,7 +157,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
         nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
         nlos = nlos.reshape(draws, len(w), link.receive, link.transmit)
         fresh = replace(link, nlos=nlos, gains=link.gains.in_slots(chosen))
-        H = fresh.channel(w, fresh.small_scale(w))
+        H = fresh.channel(w)
         P = P[chosen] if how.blind else how.precoders(link, H)
         at = np.maximum(0.0, link.draw_rates(H, P))
         rates.append(at)

@@ -22,12 +22,8 @@ from faao_mav.radio.channel import (
     rayleigh,
     rician,
 )
-from faao_mav.radio.constellation import (
-    DifferenceClasses,
-    difference_classes,
-)
+from faao_mav.radio.constellation import DifferenceClasses, difference_classes
 from faao_mav.radio.gain import GainField, GainFunction
-from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.rate_steps import StreamRate, one_stream
 from faao_mav.radio.relay import RelayQueue
@@ -53,7 +49,6 @@ class Link:
     these, of one stream, whatever the alphabet.
     """
 
-    name: str
     gains: GainField
     to_relay: bool
     power: float
@@ -130,8 +125,12 @@ class Link:
             return los * rician(np.ones_like(self.nlos), self.nlos, self.rician_factor)
         return rician(los, self.nlos, self.rician_factor)
 
-    def channel(self, w: Real, H_r: Complex) -> Complex:
-        """Return H = sqrt(gain) H_r, (1) or (2), at the positions w (N + 2, 2)."""
+    def channel(self, w: Real, H_r: Complex | None = None) -> Complex:
+        """Return H = sqrt(gain) H_r, (1) or (2), at the positions w (N + 2, 2).
+
+        H_r is that of `small_scale` where it is not given.
+        """
+        H_r = self.small_scale(w) if H_r is None else H_r
         return np.sqrt(self.gains.gain(w.T))[:, None, None] * H_r
 
     def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
@@ -246,10 +245,7 @@ class Problem:
             return None
         model = self.plan.power_model
         assert model is not None  # plans that limit the energy have one
-        most = self.energy - self._radiated(kin)
-        return EnergyLimit(
-            model, most, kin.time_step, kin.max_speed, kin.max_acceleration, kin.wind
-        )
+        return EnergyLimit(model, self.energy - self._radiated(kin), kin)
 
     def _radiated(self, kin: Kinematics) -> float:
         """Return what the relay's radio sends, J."""
@@ -301,13 +297,9 @@ def _places(plan: Plan, station: Station, late: float = 0.0) -> Real:
 
 def counted_as_cutoff(problem: Problem) -> Problem:
     """Return `problem` with the cutoff rate as the rate that counts."""
-    plan = problem.plan
-    return replace(
-        problem,
-        plan=plan.changed({"optimizer.rate": "cutoff"}),
-        bs_uav=replace(problem.bs_uav, measure="cutoff"),
-        uav_user=replace(problem.uav_user, measure="cutoff"),
-    )
+    first, second = (replace(link, measure="cutoff") for link in problem.links)
+    plan = problem.plan.changed({"optimizer.rate": "cutoff"})
+    return replace(problem, plan=plan, bs_uav=first, uav_user=second)
 
 
 class OwnParts(TypedDict, total=False):
@@ -341,75 +333,44 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
     <Problem of <Plan 'copter relay near Canberra': 120 s in slots of 0.5 s, ardupilot copter>>
     """
     check_size(plan)
-    radio, slots = plan.radio, plan.flight.slots
-    laws = (parts["gain"],) * 2 if "gain" in parts else radio.path_gains
-    maps = (None,) * 2 if "gain" in parts else tuple(law.map for law in radio.gain_laws)
+    radio, own = plan.radio, "gain" in parts
     base, relay, user = radio.base_station, radio.relay, radio.ground_user
     rng = np.random.default_rng(radio.seed)
-
-    def link(
-        name: str,
-        to_relay: bool,
-        station: Station,
-        receive: int,
-        transmit: int,
-        power: float,
-        noise: float,
-        law: GainFunction,
-        over: GainMap | None,
-    ) -> Link:
+    links = []
+    hops = (
+        (base, relay.antennas, base.antennas, base.power, relay.noise),
+        (user, user.antennas, relay.antennas, relay.power, user.noise),
+    )
+    for hop, (station, receive, transmit, power, noise) in enumerate(hops):
         match radio.fading:
             case "realization":
-                nlos: Complex | None = rayleigh(rng, slots, receive, transmit)
+                nlos: Complex | None = rayleigh(rng, plan.flight.slots, receive, transmit)
             case "ergodic":
                 nlos = balanced_rayleigh(rng, radio.fading_samples, receive, transmit)[:, None]
             case "none":
                 nlos = None
-        return Link(
-            name=name,
-            gains=GainField(
-                law,
-                _places(plan, station),
-                plan.flight.altitude,
-                None if over is None else over.at(plan.flight.altitude),
-            ),
-            to_relay=to_relay,
-            power=power,
-            noise=noise,
-            receive=receive,
-            transmit=transmit,
-            modulation=radio.modulation,
-            rician_factor=radio.rician_factor,
-            line_of_sight=radio.line_of_sight,
-            nlos=nlos,
-            measure=plan.optimizer.rate,
-            steps=parts.get("rate", radio.rate_steps),
+        over = None if own else radio.gain_laws[hop].map
+        gains = GainField(
+            parts["gain"] if own else radio.path_gains[hop],
+            _places(plan, station),
+            plan.flight.altitude,
+            None if over is None else over.at(plan.flight.altitude),
         )
-
-    return Problem(
-        plan=plan,
-        kinematics=kinematics(plan),
-        bs_uav=link(
-            "base station to UAV",
-            True,
-            base,
-            relay.antennas,
-            base.antennas,
-            base.power,
-            relay.noise,
-            laws[0],
-            maps[0],
-        ),
-        uav_user=link(
-            "UAV to ground user",
-            False,
-            user,
-            user.antennas,
-            relay.antennas,
-            relay.power,
-            user.noise,
-            laws[1],
-            maps[1],
-        ),
-        precoder=parts.get("precoder"),
-    )
+        links.append(
+            Link(
+                gains=gains,
+                to_relay=hop == 0,
+                power=power,
+                noise=noise,
+                receive=receive,
+                transmit=transmit,
+                modulation=radio.modulation,
+                rician_factor=radio.rician_factor,
+                line_of_sight=radio.line_of_sight,
+                nlos=nlos,
+                measure=plan.optimizer.rate,
+                steps=parts.get("rate", radio.rate_steps),
+            )
+        )
+    bs_uav, uav_user = links
+    return Problem(plan, kinematics(plan), bs_uav, uav_user, precoder=parts.get("precoder"))

@@ -299,8 +299,8 @@ CONSTRAINTS: list[Constraint] = [
     Disc(V, 0.4, (0.1, -0.3), 1.0),
     SpeedChange(0.3, 0.2, 0.5, (0.1, -0.3)),
     TurnRate(0.3, 2.0, 0.1),
-    EnergyLimit(RotaryWing(80.0, 90.0, 120.0, 4.0, 0.01, 20.0), 1e4, 0.5, 20.0, 5.0, (1.0, 2.0)),
-    EnergyLimit(FixedWing.fitted(90.0, 15.0, 2.5), 1e4, 0.5, 20.0, 5.0, (1.0, 2.0)),
+    EnergyLimit(RotaryWing(80.0, 90.0, 120.0, 4.0, 0.01, 20.0), 1e4, plane(20, wind=(1.0, 2.0))),
+    EnergyLimit(FixedWing.fitted(90.0, 15.0, 2.5), 1e4, plane(20, wind=(1.0, 2.0))),
     *(
         Queue(Rewards(ACTIVE, np.full((2, 4), 80.0)), RelayQueue(half, 30.0), 0.5)
         for half in (False, True)

@@ -9,32 +9,28 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import A, Constraint, Rows, V
-from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.plan import Vector
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.power import PowerModel, PowerPartials
 
 
 @dataclass(frozen=True)
 class EnergyLimit(Constraint):
-    """At most `most` J for flying at the speeds v_n through air that moves with `wind`, m/s.
+    """At most `most` J for a flight of `kin`: by `model`, of speeds through the air.
 
     g is what is left in shares of a slot's even part. The method leaves a share `inside` unused.
     """
 
     model: PowerModel
     most: float
-    time_step: float
-    max_speed: float
-    max_acceleration: float
-    wind: Vector = (0.0, 0.0)
+    kin: Kinematics
     of = V + A
     total = True
 
     def rows(self, x: Real) -> Rows:
         """Return what each slot takes less than its even part."""
-        power = self.partials(self.max_speed * x[:2], self.max_acceleration * x[2:])
-        unit = self.time_step * x.shape[1] / self.most
-        scale = np.repeat([self.max_speed, self.max_acceleration], 2)
+        scale = np.repeat([self.kin.max_speed, self.kin.max_acceleration], 2)
+        power = self.partials(*np.split(scale[:, None] * x, 2))
+        unit = self.kin.time_step * x.shape[1] / self.most
         slope = np.concatenate([power.by_v, power.by_a]) * scale[:, None]
         bend = np.empty((4, 4, x.shape[1]))
         for first, packed in ((0, power.by_vv), (2, power.by_aa)):
@@ -47,8 +43,8 @@ class EnergyLimit(Constraint):
 
     def partials(self, v: Real, a: Real) -> PowerPartials:
         """Return the power, W, at v over ground and a, (2, ...), m/s, m/s^2, with derivatives."""
-        return self.model.partials(v - np.reshape(self.wind, (2, *[1] * (v.ndim - 1))), a)
+        return self.model.partials(v - np.reshape(self.kin.wind, (2, *[1] * (v.ndim - 1))), a)
 
     def used(self, flight: Trajectory) -> float:
         """Return what `flight` takes, J."""
-        return self.time_step * float(self.partials(flight.v.T, flight.a.T).value.sum())
+        return self.kin.time_step * float(self.partials(flight.v.T, flight.a.T).value.sum())
