@@ -12,7 +12,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.fence_geometry import FenceGeometry
-from faao_mav.optimizer.interior.energy import EnergyLimit
+from faao_mav.optimizer.interior.limits import EnergyLimit
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.rates.field import rate_field

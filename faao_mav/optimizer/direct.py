@@ -1,11 +1,11 @@
 """The direct method: one loop over trajectory and precoders on the true rate.
 
 maximise min(R_U, R_G) of (9), (10) under (11)-(13f), or with `radio.causal` what the relay delivers
-of both rates: see `interior.queue`. More rate in a slot never delivers less, so that the best
-precoders are the same. For given positions the best precoders of
-every slot are a problem of their own, so that the rates become functions of the trajectory alone;
-by the envelope theorem their gradients are those at the best precoders. What is left is a flight
-through two fields of rates, which `interior` solves in time linear in the number of slots.
+of both rates: see `rewards.Queue`. More rate in a slot never delivers less, so that the best
+precoders are the same. For given positions the best precoders of every slot are a problem of their
+own, so that the rates become functions of the trajectory alone; by the envelope theorem their
+gradients are those at the best precoders. What is left is a flight through two fields of rates,
+which `interior` solves in time linear in the number of slots.
 
 Measured (benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from the same
 starts, and several times quicker.

@@ -1,13 +1,35 @@
-"""Plan -> Solution, by the method that the plan asks for."""
+"""Plan -> Solution, by the method that the plan asks for, at the best of the heights it allows.
 
+Under the paper's law the lowest height is the best wherever the stations are; under a law with
+terms over the elevation, over a map or beside ground it is not, and it may have several local
+optima. Heights are tried at even distances, and those about the best ones to the end: each is a
+whole plan, which begins with the flight of the last.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Unpack
 
-from faao_mav.errors import InputError
+import numpy as np
+
+from faao_mav.errors import InfeasibleError, InputError, PlanError
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import OwnParts, build_problem
-from faao_mav.optimizer.solution import Observer, Solution, staged
+from faao_mav.optimizer.shadowing import shadowed
+from faao_mav.optimizer.solution import BestHeight, Observer, Solution, staged
 from faao_mav.plan import Plan
+from faao_mav.plan.fields import dbm
 from faao_mav.plan.sections import Heights
+
+_EVENLY, _REFINED = 9, 2
+"""Heights that are tried at first, and local optima among them that are then sought. Chosen."""
+
+_DECIMALS = 1
+"""Decimals of a height, m: missions and aircraft keep no finer one. Chosen."""
+
+Solve = Callable[[Plan, Trajectory | None], Solution]
+"""How a plan of one height is solved, from the flight of a plan nearby where there is one."""
 
 
 def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[OwnParts]) -> Solution:
@@ -28,7 +50,6 @@ def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[Own
     if parts and plan.optimizer.method == "algorithm1":
         raise InputError(f"{', '.join(parts)}: Algorithm 1 takes no parts of one's own")
     if isinstance(plan.flight.height, Heights):
-        from faao_mav.optimizer.height import best_height  # brings scipy.optimize along
 
         def at_height(candidate: Plan, known: Trajectory | None) -> Solution:
             told = staged(observe, f"height {candidate.flight.altitude:g} m")
@@ -57,3 +78,79 @@ def _solved(
     from faao_mav.optimizer.direct import direct
 
     return direct(problem, observe=observe, known=known)
+
+
+def best_height(plan: Plan, solve: Solve) -> Solution:
+    """Return the solution of `plan` at the best of its heights; it tells what other ones bring.
+
+    The heights are those of `flight.altitude` between the floor and the ceiling of the vehicle's
+    own fence. Raises `PlanError` where none is left, and what `solve` raises where no height has a
+    flight.
+    """
+    from scipy.optimize import minimize_scalar
+
+    low, high = _limits(plan)
+    solved: dict[float, Solution] = {}
+    refused: dict[float, Exception] = {}
+
+    def worth(height: float) -> float:
+        at = round(float(height), _DECIMALS)
+        if at not in solved and at not in refused:
+            near = min(solved, key=lambda other: abs(other - at), default=None)
+            known = None if near is None else solved[near].trajectory
+            try:
+                solved[at] = solve(plan.changed({"flight.altitude": at}), known)
+            except (InfeasibleError, PlanError) as error:
+                refused[at] = error
+        return _worth(solved[at]) if at in solved else -math.inf
+
+    grid = np.linspace(low, high, _EVENLY)
+    values = np.array([-math.inf, *map(worth, grid), -math.inf])
+    if not solved:
+        raise next(iter(refused.values()))
+    inner = values[1:-1]
+    peaks = np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]) & np.isfinite(inner))
+    least = float(inner[np.isfinite(inner)].min()) - 1.0  # instead of what has no flight
+    for k in peaks[np.argsort(-inner[peaks], kind="stable")][:_REFINED]:
+        about = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+        minimize_scalar(
+            lambda height: -max(worth(height), least),
+            bounds=about,
+            method="bounded",
+            options={"xatol": 10.0**-_DECIMALS},
+        )
+    best = max(solved.values(), key=_worth)
+    at_low, at_high = (solved.get(round(end, _DECIMALS)) for end in (low, high))
+    return replace(best, height=BestHeight(low, high, at_low, at_high, len(solved)))
+
+
+def _limits(plan: Plan) -> tuple[float, float]:
+    """Return the least and the greatest height that plan and vehicle's fence allow, m."""
+    asked, (floor, ceiling) = plan.flight.height, plan.aircraft.fence_heights
+    assert isinstance(asked, Heights)
+    low, high = max(asked.least, floor), min(asked.most, ceiling)
+    if low > high:
+        raise PlanError(
+            f"{plan.source}: flight.altitude: {asked.least:g} to {asked.most:g} m: the vehicle's "
+            f"fence allows {floor:g} to {ceiling:g} m (vehicle.parameters); give heights in it"
+        )
+    return low, high
+
+
+def _worth(solution: Solution) -> float:
+    """Return what a plan is for, the more the better: a rate, what arrives, or less of its goal."""
+    plan, goal = solution.plan, solution.plan.goal
+    match goal.minimise:
+        case "duration":
+            return -plan.flight.duration
+        case "power":
+            return -dbm(plan.powers[0])
+        case "energy":
+            assert solution.energy_wh is not None
+            return -solution.energy_wh
+    if goal.maximise == "data":
+        return solution.delivered_rate * plan.flight.duration
+    if (under := shadowed(solution)) is not None:
+        reliability = plan.radio.reliability
+        return under.quantiles[round(1 - reliability, 9)] if reliability else under.mean
+    return solution.delivered_rate if plan.radio.causal else solution.rates.R_avg

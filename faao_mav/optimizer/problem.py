@@ -4,13 +4,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias, TypedDict, Unpack
+from typing import TypeAlias, TypedDict, Unpack
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
+from faao_mav.optimizer.interior.constraint import Constraint
+from faao_mav.optimizer.interior.fence import fence_constraints
+from faao_mav.optimizer.interior.limits import EnergyLimit
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.optimizer.size import check_size
 from faao_mav.plan import Plan
@@ -27,11 +30,6 @@ from faao_mav.radio.gain import GainField, GainFunction
 from faao_mav.radio.rate import Measure, draw_rates
 from faao_mav.radio.rate_steps import StreamRate, one_stream
 from faao_mav.radio.relay import RelayQueue
-
-if TYPE_CHECKING:
-    from faao_mav.optimizer.interior.constraint import Constraint
-    from faao_mav.optimizer.interior.energy import EnergyLimit
-
 
 OwnPrecoder: TypeAlias = Callable[[RealOrComplex, float, float], Complex]
 """A precoder of one's own: from channels (..., N_r, N_t), the power W and the noise sigma², W, it
@@ -210,22 +208,20 @@ class Problem:
         """What the path keeps its distance from; None where it may be anywhere."""
         return fence_geometry(self.plan)
 
-    def constraints(self, kin: Kinematics) -> "tuple[Constraint, ...]":
+    def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
         energy = self.energy_limit(kin)
         return (*self.fenced(kin), *([] if energy is None else [energy]))
 
     def fenced(
         self, kin: Kinematics, near: tuple[Real, float] | None = None
-    ) -> "tuple[Constraint, ...]":
+    ) -> tuple[Constraint, ...]:
         """Return what flights of `kin` have to keep of the fence.
 
         With `near` that is what matters to flights within so many m of a path (n, 2).
         """
         if self.fence is None:
             return ()
-        from faao_mav.optimizer.interior.fence import fence_constraints  # brings scipy along
-
         return fence_constraints(self.fence if near is None else self.fence.near(*near), kin)
 
     def energy_of(self, flight: Trajectory) -> float | None:
@@ -237,10 +233,8 @@ class Problem:
         power = model(np.pad(flight.v - kin.wind, level), np.pad(flight.a, level))
         return kin.time_step * float(power.sum()) + self._radiated(kin)
 
-    def energy_limit(self, kin: Kinematics) -> "EnergyLimit | None":
+    def energy_limit(self, kin: Kinematics) -> EnergyLimit | None:
         """Return the limit on the energy of flights of `kin`; None where there is none."""
-        from faao_mav.optimizer.interior.energy import EnergyLimit
-
         if self.energy == math.inf:
             return None
         model = self.plan.power_model

@@ -10,8 +10,7 @@ from fenced import FENCES, dense_path, fenced
 from hypothesis import given
 
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.fence_geometry import FenceGeometry
-from faao_mav.optimizer.interior.separation import ConvexObstacles
+from faao_mav.optimizer.fence_geometry import ConvexObstacles, FenceGeometry
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem

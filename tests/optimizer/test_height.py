@@ -7,8 +7,8 @@ import pytest
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import PlanError
-from faao_mav.optimizer.height import best_height
 from faao_mav.optimizer.kinematics import Trajectory
+from faao_mav.optimizer.optimize import best_height
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.keys import ALIASES, POWER

@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.chain import Chain
 from faao_mav.optimizer.interior.constraint import Constraint, Grid, V
-from faao_mav.optimizer.interior.energy import EnergyLimit
+from faao_mav.optimizer.interior.limits import Disc, EnergyLimit, SpeedChange, TurnRate
 from faao_mav.optimizer.interior.maximize import maximize
-from faao_mav.optimizer.interior.queue import Queue
-from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValues
-from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
+from faao_mav.optimizer.interior.rewards import Goal, Queue, Rewards, Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.scaled import flight_variables
 from faao_mav.optimizer.search.straight import straight_flight

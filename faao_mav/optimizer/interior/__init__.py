@@ -16,8 +16,8 @@ step. Repeated short steps mean that the iterates hug the limits: then the multi
 anew.
 
 Files: `maximize` is the entry; `search` iterates, `newton` takes one step, `chain` is its matrix;
-`rewards` and `queue` are what is maximised, `speed_limits`, `energy` and `fence` what is kept. To
-add a constraint is to write one class: see `constraint`.
+`rewards` are what is maximised, `limits` and `fence` what is kept. To add a constraint is to write
+one class: see `constraint`.
 
 Units inside: lengths in 100 m, speeds in v_max, accelerations in a_max, rewards summed over the
 slots and divided by the largest gradient at the start.

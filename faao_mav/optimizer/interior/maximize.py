@@ -8,10 +8,9 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import ALLOWED, A, Constraint, V, every_excess, unknowns
-from faao_mav.optimizer.interior.queue import Queue
-from faao_mav.optimizer.interior.rewards import Rewards, Stage
+from faao_mav.optimizer.interior.limits import Disc, SpeedChange, TurnRate
+from faao_mav.optimizer.interior.rewards import Queue, Rewards, Stage
 from faao_mav.optimizer.interior.search import COLD, SLOW, WARM, Search
-from faao_mav.optimizer.interior.speed_limits import Disc, SpeedChange, TurnRate
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
 

@@ -14,7 +14,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, every_excess
-from faao_mav.optimizer.interior.energy import EnergyLimit
+from faao_mav.optimizer.interior.limits import EnergyLimit
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.search.cruise import cruise_by
 from faao_mav.optimizer.search.straight import straight_flight, with_stops
