@@ -283,8 +283,7 @@ def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
     With known draws they are searched afresh too, and the better kept.
     """
     H = link.channel(w)
-    at = link_coordinates(link, w.T)
-    near = rate.initial_precoders(at.gain_log, at.cosine) if scheme.optimal else None
+    near = rate.initial_precoders(*link_coordinates(link, w.T)) if scheme.optimal else None
     if near is None:
         return scheme.precoders(link, H)
     if link.measure != "cutoff":

@@ -146,29 +146,11 @@ def worth(problem: Problem, w: Real, rates: Rates) -> float:
     return float(found.mean() if reliability is None else np.quantile(found, 1 - reliability))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Tolled:
-    """The rates of `stage` less `factors` (2, n) times what `maps` rise from `before` (2, n)."""
+def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> Stage:
+    """Return `stage` with the toll of a flight at w (n, 2) for z standard deviations.
 
-    stage: Stage
-    factors: Real
-    maps: tuple[Spline, Spline]
-    before: Real
-
-    def __call__(self, w: Real) -> StageValues:
-        """Return rewards, gradients and Hessians at positions w (2, ..., n)."""
-        at = self.stage(w)
-        value, gradient, hessian = at.value.copy(), at.gradient.copy(), at.hessian.copy()
-        for j, each in enumerate(self.maps):
-            f, f_x, f_y, f_xx, f_xy, f_yy = each.by_both(w[0], w[1])
-            value[j] = np.maximum(0.0, value[j] - self.factors[j] * (f - self.before[j]))
-            gradient[:, j] -= self.factors[j] * np.stack([f_x, f_y])
-            hessian[:, j] -= self.factors[j] * np.stack([f_xx, f_xy, f_yy])
-        return StageValues(value, gradient, hessian)
-
-
-def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> Tolled:
-    """Return `stage` with the toll of a flight at w (n, 2) for z standard deviations."""
+    That is a factor of each slot times what a map of the places of that flight rises from there.
+    """
     now, slopes = rates(0.0), rates(0.5) - rates(-0.5)
     parts = ([[1], [1]], [[0.99], [1]], [[1], [0.99]])
     most, *less = (arriving(problem, now * np.array(part))[-1] / len(w) for part in parts)
@@ -188,4 +170,16 @@ def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> T
         maps.append(Spline.through(x, y, felt))
         variance += float(each @ maps[-1].value(*w.T))
     before = np.stack([each.value(*w.T) for each in maps])
-    return Tolled(stage, z * slopes / np.sqrt(variance), (maps[0], maps[1]), before)
+    factors = z * slopes / np.sqrt(variance)
+
+    def less_its_toll(w: Real) -> StageValues:
+        at = stage(w)
+        value, gradient, hessian = at.value.copy(), at.gradient.copy(), at.hessian.copy()
+        for j, each in enumerate(maps):
+            f, f_x, f_y, f_xx, f_xy, f_yy = each.by_both(w[0], w[1])
+            value[j] = np.maximum(0.0, value[j] - factors[j] * (f - before[j]))
+            gradient[:, j] -= factors[j] * np.stack([f_x, f_y])
+            hessian[:, j] -= factors[j] * np.stack([f_xx, f_xy, f_yy])
+        return StageValues(value, gradient, hessian)
+
+    return less_its_toll

@@ -307,6 +307,9 @@ def make_solution(
 
 _ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "history")
 _RELAYED = ("received", "forwarded", "queue")
+_OPTIONAL = ("shares", "gain")
+_SCALARS = ("converged", "ending", *_OPTIONAL)
+_TEXTS = ("plan", "ending", "starts")
 
 
 def save_solution(
@@ -328,19 +331,17 @@ def save_solution(
     >>> bool(np.all(loaded.w == solution.w))
     True
     """
-    rates = solution.rates
-    values: dict[str, Any] = {name: getattr(solution, name) for name in _ARRAYS}
-    values |= {"R_avg": rates.R_avg, "R_U": rates.R_U, "R_G": rates.R_G}
+    values: dict[str, Any] = {name: getattr(solution, name) for name in (*_ARRAYS, *_SCALARS)}
+    values |= {name: getattr(solution.rates, name) for name in ("R_avg", "R_U", "R_G")}
     values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
-    values["R_del"] = solution.delivered_rate
-    optional = {"shares": solution.shares, "gain": solution.gain}
-    values |= {name: value for name, value in optional.items() if value is not None}
-    values |= {"converged": solution.converged, "ending": solution.ending}
-    values["starts"] = json.dumps(dict(solution.starts))
-    values["plan"] = solution.plan.text
+    values |= {
+        "R_del": solution.delivered_rate,
+        "starts": json.dumps(dict(solution.starts)),
+        "plan": solution.plan.text,
+    }
     values |= extra or {}
     buffer = io.BytesIO()
-    np.savez(buffer, **values)
+    np.savez(buffer, **{name: value for name, value in values.items() if value is not None})
     write_whole(path, buffer.getvalue())
 
 
@@ -354,18 +355,14 @@ def load_solution(path: str | Path) -> Solution:
     """
     from pydantic import TypeAdapter, ValidationError
 
-    texts, told = ("plan", "ending", "starts"), dict[str, str]()
-    required, optional = (*texts, "converged", *_ARRAYS), ("shares", "gain")
-    found = read_archive(path, (*required, *optional))
+    required = (*_TEXTS, "converged", *_ARRAYS)
+    found = read_archive(path, (*required, *_OPTIONAL))
     for name in required:
         if name not in found:
             raise InputError(f"{path}: not a result of faao-mission --save: {name} is missing")
-    for name in texts:
-        if found[name].dtype.kind != "U" or found[name].shape:
-            kind = f"{found[name].dtype} {found[name].shape}"
-            raise InputError(f"{path}: {name}: {kind}; expected text")
-        told[name] = str(found[name])
-    plan = parse_plan(told["plan"], f"{path} (plan)")
+    for name in _TEXTS:
+        _check(found[name], "U", (), f"{path}: {name}")
+    plan = parse_plan(str(found["plan"]), f"{path} (plan)")
     for name, (kinds, shape) in _expected(plan, len(found["history"].ravel())).items():
         if name in found:
             _check(found[name], kinds, shape, f"{path}: {name}")
@@ -373,15 +370,15 @@ def load_solution(path: str | Path) -> Solution:
     if shares is not None and not ((shares >= 0) & (shares <= 1)).all():
         raise InputError(f"{path}: shares: expected a number of 0 to 1 per slot")
     try:
-        starts = TypeAdapter(dict[str, float]).validate_json(told["starts"], strict=True)
+        starts = TypeAdapter(dict[str, float]).validate_json(str(found["starts"]), strict=True)
     except ValidationError:
-        said = quote(told["starts"])
+        said = quote(str(found["starts"]))
         raise InputError(f"{path}: starts: {said}; expected rates by start") from None
     arrays: dict[str, Any] = {name: found[name] for name in _ARRAYS}
     return Solution(
         problem=build_problem(plan),
         converged=bool(found["converged"]),
-        ending=told["ending"],
+        ending=str(found["ending"]),
         starts=starts,
         shares=shares,
         gain=float(found["gain"]) if "gain" in found else None,
@@ -415,11 +412,10 @@ def _expected(plan: Plan, steps: int) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def _check(array: "np.ndarray[Any, Any]", kinds: str, shape: tuple[int, ...], where: str) -> None:
-    """Raise `InputError` unless `array` has finite numbers of one of the `kinds`, in `shape`."""
+    """Raise `InputError` unless `array` is of one of the `kinds`, in `shape`, and finite."""
     if array.dtype.kind not in kinds or array.shape != shape:
-        raise InputError(
-            f"{where}: {array.dtype} {array.shape}; expected numbers {shape}, "
-            "as the plan in the file has them"
-        )
-    if not np.isfinite(array).all():
+        numbers = f"numbers {shape}, as the plan in the file has them"
+        expected = "text" if kinds == "U" else numbers
+        raise InputError(f"{where}: {array.dtype} {array.shape}; expected {expected}")
+    if kinds != "U" and not np.isfinite(array).all():
         raise InputError(f"{where}: expected finite numbers")

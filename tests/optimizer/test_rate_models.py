@@ -11,7 +11,7 @@ from conftest import MakePlan
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design, design
 from faao_mav.optimizer.problem import Link, build_problem
-from faao_mav.optimizer.rates import RateModel, link_coordinates
+from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
 from faao_mav.optimizer.rates.field import rate_models
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import TableRate
@@ -36,13 +36,11 @@ def places(link: Link, seed: int = 3) -> Real:
 
 
 def coordinates(link: Link, w: Real) -> tuple[Real, Real]:
-    at = link_coordinates(link, w.T)
-    return at.gain_log, at.cosine
+    return link_coordinates(link, w.T)
 
 
 def derivatives(link: Link, rate: RateModel, w: Real) -> tuple[Real, Real]:
-    at = link_coordinates(link, w.T)
-    gradient, hessian = at.by_position(rate.partials(at.gain_log, at.cosine))
+    gradient, hessian = by_position(link, w.T, rate.partials(*coordinates(link, w)))
     return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
 
 

@@ -73,21 +73,22 @@ class System:
         self.chain = Chain(grid, goal, self.free)
         self.objective = np.zeros(x.shape)
         self.objective[COMMON:] = goal.slope[:, None] * self.free[COMMON:]
-        slotwise, sums = list[_Part](), list[_Part]()
-        on = [np.zeros((0, n), dtype=np.bool_)]
-        for each in (goal, *constraints):
-            places = [*each.of, *(range(COMMON, len(x)) if each is goal else ())]
-            kept = sums if each.total else slotwise
-            count = len(each.rows(x[places]).value)
-            first = kept[-1].rows.stop if kept else 0
-            kept.append(_Part(each, places, slice(first, first + count)))
-            if not each.total:
-                on.append(each.on(grid, count))
-        self.on, self.first_sum = np.concatenate(on), int(sum(map(np.sum, on)))
-        self.parts, self._slotwise = [*slotwise, *sums], len(slotwise)
+        self.parts, on = list[_Part](), [np.zeros((0, n), dtype=np.bool_)]
         # each constraint as often as it has inequalities, and in how many slots each of these is
-        often = [(part.constraint, int(self.on[part.rows].sum()), 1) for part in slotwise]
-        often += [(part.constraint, part.rows.stop - part.rows.start, n) for part in sums]
+        often, first = list[tuple[Constraint, int, int]](), 0
+        for each in sorted((goal, *constraints), key=lambda each: each.total):
+            places = [*each.of, *(range(COMMON, len(x)) if each is goal else ())]
+            count = len(each.rows(x[places]).value)
+            self.parts.append(_Part(each, places, slice(first, first + count)))
+            first += count
+            if each.total:
+                often.append((each, count, n))
+            else:
+                on.append(each.on(grid, count))
+                often.append((each, int(on[-1].sum()), 1))
+        self.on, self._slotwise = np.concatenate(on), len(on) - 1
+        self.first_sum = int(self.on.sum())
+        self._of_goal = next(k for k, part in enumerate(self.parts) if part.constraint is goal)
 
         def of_each(value: Callable[[Constraint, int], float]) -> Real:
             return np.repeat([value(each, s) for each, _, s in often], [k for _, k, _ in often])
@@ -104,27 +105,25 @@ class System:
     def at(self, x: Real) -> Functions:
         """Return the inequalities at x (k, n)."""
         rows = [part.constraint.rows(x[part.places]) for part in self.parts]
-        split = self._slotwise
-        g = np.concatenate([np.zeros((0, x.shape[1])), *(each.value for each in rows[:split])])
-        sums = [each.value.sum(axis=1) for each in rows[split:]]
-        values = np.concatenate([g[self.on], *sums])
-        slopes = np.zeros((sum(map(len, sums)), *x.shape))
-        for part, each in zip(self.parts[split:], rows[split:], strict=True):
-            slopes[part.rows, part.places] = each.slope
+        g, first = np.concatenate([each.value for each in rows]), len(self.on)
+        values = np.append(g[:first][self.on], g[first:].sum(axis=1))
+        slopes = np.zeros((len(g) - first, *x.shape))
+        for part, each in zip(self.parts[self._slotwise :], rows[self._slotwise :], strict=True):
+            slopes[part.rows.start - first : part.rows.stop - first, part.places] = each.slope
         return Functions(x, rows, values - self.inside, slopes * self.free)
 
-    def spread(self, z: Real) -> tuple[Real, Real]:
-        """Return z (m,) as those of slots, (rows, n), and those of sums (T,)."""
+    def spread(self, z: Real) -> Real:
+        """Return z (m,) as those of all rows in all slots, those of sums the same in each."""
         rows = np.zeros(self.on.shape)
         rows[self.on] = z[: self.first_sum]
-        return rows, z[self.first_sum :]
+        sums = np.outer(z[self.first_sum :], np.ones(self.on.shape[-1]))
+        return np.concatenate([rows, sums])
 
     def pull(self, at: Functions, z: Real) -> Real:
         """Return J^T z, (k, n), of z (m,)."""
-        per_slot, sums = self.spread(z)
-        force = np.einsum("t,tkn->kn", sums, at.slopes)
-        for part, rows in self._in_slots(at):
-            force[part.places] += np.einsum("mn,min->in", per_slot[part.rows], rows.slope)
+        weights, force = self.spread(z), np.zeros(at.x.shape)
+        for part, rows in zip(self.parts, at.rows, strict=True):
+            force[part.places] += np.einsum("mn,min->in", weights[part.rows], rows.slope)
         return np.asarray(force * self.free)
 
     def along(self, at: Functions, dx: Real) -> Real:
@@ -136,7 +135,7 @@ class System:
 
     def stiffness(self, at: Functions, weights: Real) -> Real:
         """Return J^T diag(`weights`) J of the inequalities in slots, (k, k, n)."""
-        stiff, _ = self.spread(weights)
+        stiff = self.spread(weights)
         found = np.zeros((len(at.x), *at.x.shape))
         for part, rows in self._in_slots(at):
             J = rows.slope
@@ -146,23 +145,18 @@ class System:
 
     def curvature(self, at: Functions, z: Real) -> Real:
         """Return the Hessian of the Lagrangian, (k, k, n), at multipliers z."""
-        per_slot, sums = self.spread(z)
-        everywhere = np.repeat(sums[:, None], at.x.shape[1], axis=1)
+        weights = self.spread(z)
         found = np.zeros((len(at.x), *at.x.shape))
         for part, rows in zip(self.parts, at.rows, strict=True):
             if rows.bend is not None:
-                weights = (everywhere if part.constraint.total else per_slot)[part.rows]
-                block = np.einsum("mn,mijn->ijn", weights, rows.bend)
+                block = np.einsum("mn,mijn->ijn", weights[part.rows], rows.bend)
                 found[np.ix_(part.places, part.places)] -= block
         return found
 
     def steepness(self, at: Functions, z: Real) -> float:
         """Return the largest gradient of what the goal has of w, weighted by z."""
-        per_slot, sums = self.spread(z)
-        first = 0 if not self.goal.total else self._slotwise
-        slope, rows = at.rows[first].slope[:, :2], self.parts[first].rows
-        weights = sums[rows, None] if self.goal.total else per_slot[rows]
-        return float((np.abs(slope) * weights[:, None]).sum(axis=0).max())
+        slope, rows = at.rows[self._of_goal].slope[:, :2], self.parts[self._of_goal].rows
+        return float((np.abs(slope) * self.spread(z)[rows, None]).sum(axis=0).max())
 
     def bent(self, at: Functions, dx: Real) -> Real:
         """Return half the second-order change of each inequality along dx in its slot, (m,)."""

@@ -8,7 +8,7 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 - u = (x - x_p) / d, the direction cosine along east, where the antenna arrays are rotated by it
   (``radio.line_of_sight: ula``).
 
-A rate model (``RateModel``) therefore works with l and u, and ``LinkCoordinates`` carries its
+A rate model (``RateModel``) therefore works with l and u, and ``by_position`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
 two models:
 
@@ -65,46 +65,27 @@ class RateModel(Protocol):
         """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,), if known."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LinkCoordinates:
-    """The positions w as the station of `link` sees them.
+def link_coordinates(link: Link, w: Real) -> tuple[Real, Real]:
+    """Return l and u (..., n) of the positions w (2, ..., n), m, for the station of `link`."""
+    away = link.gains.away(w)
+    return link.gains.log(w), away[0] / np.sqrt(link.gains.squared_distance(away))
 
-    `w` (2, ..., n) are the positions, m, `gain_log` (..., n) is l and `cosine` (..., n) is u.
+
+def by_position(link: Link, w: Real, rate: RatePartials) -> tuple[Real, Real]:
+    """Return gradient and Hessian of a `rate` of `link` by the positions w (2, ..., n).
+
+    That is R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per m².
     """
-
-    link: Link
-    w: Real
-    gain_log: Real
-    cosine: Real
-
-    def by_position(self, rate: RatePartials) -> tuple[Real, Real]:
-        """Return gradient and Hessian of a rate by w.
-
-        Returns:
-            R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per m².
-        """
-        l_i, l_ij = self.link.gains.slopes(self.w)
-        gradient = rate.by_l * l_i
-        hessian = rate.by_l * l_ij + rate.by_ll * products(l_i, l_i)
-        if rate.by_u is not None and rate.by_lu is not None and rate.by_uu is not None:
-            u_i, u_ij = self._cosine_slopes()
-            gradient += rate.by_u * u_i
-            hessian += rate.by_u * u_ij + rate.by_uu * products(u_i, u_i)
-            hessian += 2 * rate.by_lu * products(l_i, u_i)
-        return gradient, hessian
-
-    def _cosine_slopes(self) -> tuple[Real, Real]:
-        """Return gradient (2, ..., n) and Hessian (3, ..., n) of u = x / d by w."""
-        x, y = away = self.link.gains.away(self.w)
-        r = 1 / np.sqrt(self.link.gains.squared_distance(away))
+    l_i, l_ij = link.gains.slopes(w)
+    gradient = rate.by_l * l_i
+    hessian = rate.by_l * l_ij + rate.by_ll * products(l_i, l_i)
+    if rate.by_u is not None and rate.by_lu is not None and rate.by_uu is not None:
+        x, y = away = link.gains.away(w)
+        r = 1 / np.sqrt(link.gains.squared_distance(away))
         r3, r5 = r**3, 3 * r**5
         u_i = np.stack([r - x * x * r3, -x * y * r3])
-        u_ij = np.stack([x * (x * x * r5 - 3 * r3), y * (x * x * r5 - r3), x * (y * y * r5 - r3)])
-        return u_i, u_ij
-
-
-def link_coordinates(link: Link, w: Real) -> LinkCoordinates:
-    """Return the coordinates of the positions w (2, ..., n), m, for the station of `link`."""
-    away = link.gains.away(w)
-    cosine = away[0] / np.sqrt(link.gains.squared_distance(away))
-    return LinkCoordinates(link, w, link.gains.log(w), cosine)
+        u_xx, u_xy, u_yy = x * (x * x * r5 - 3 * r3), y * (x * x * r5 - r3), x * (y * y * r5 - r3)
+        gradient += rate.by_u * u_i
+        hessian += rate.by_u * np.stack([u_xx, u_xy, u_yy]) + rate.by_uu * products(u_i, u_i)
+        hessian += 2 * rate.by_lu * products(l_i, u_i)
+    return gradient, hessian

@@ -9,7 +9,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import Design
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates import RateModel, link_coordinates
+from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
 from faao_mav.optimizer.rates.slot_rate import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 from faao_mav.radio.gain import PER_DB, GainField
@@ -27,8 +27,8 @@ class RateField:
         """Return the rates (2, ..., n) at positions w (2, ..., n), bits, of gains `db` higher."""
         rates = []
         for link, rate in zip(self.links, self.rates, strict=True):
-            at = link_coordinates(link, w)
-            rates.append(rate.value(at.gain_log + PER_DB * db, at.cosine))
+            gain_log, cosine = link_coordinates(link, w)
+            rates.append(rate.value(gain_log + PER_DB * db, cosine))
         return np.stack(rates)
 
     def __call__(self, w: Real) -> StageValues:
@@ -36,10 +36,9 @@ class RateField:
         shape = (len(self.links), *w.shape[1:])
         value, gradient, hessian = np.empty(shape), np.empty((2, *shape)), np.empty((3, *shape))
         for j, (link, rate) in enumerate(zip(self.links, self.rates, strict=True)):
-            at = link_coordinates(link, w)
-            partials = rate.partials(at.gain_log, at.cosine)
+            partials = rate.partials(*link_coordinates(link, w))
             value[j] = partials.value
-            gradient[:, j], hessian[:, j] = at.by_position(partials)
+            gradient[:, j], hessian[:, j] = by_position(link, w, partials)
         return StageValues(value, gradient, hessian)
 
     def smoothed(self) -> "RateField":
