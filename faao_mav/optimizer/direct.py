@@ -90,28 +90,25 @@ def direct(
     routes = _routes(problem, before, known, field, alone=alone)
     tell(1, "the starts", 0.0)
     steps = problem.plan.optimizer.max_iterations * _LONG_SEARCH
-    improved, going = routes, list(routes)
-    values = [value(flight) for flight in routes.values()]
+    begun = {name: value(flight) for name, flight in routes.items()}
+    improved, reached, going = routes, begun, list(routes)
     if problem.mapped:
-        going.sort(key=dict(zip(routes, values, strict=True)).__getitem__, reverse=True)
-        del going[_FOLLOWED:]
+        going = sorted(begun, key=begun.__getitem__, reverse=True)[:_FOLLOWED]
     elif len(routes) > 1:  # a single start needs no comparison
         improved, going = improve_starts(problem, field, routes, steps)
-    flights = [*routes.values(), *improved.values()]
-    values += [value(each) for each in improved.values()] if improved is not routes else values
-    best_yet = int(np.argmax(values))
-    tell(2, "the best start", values[best_yet])
-    starts = [improved[name] for name in going]
-    if best_yet < len(routes) and not problem.mapped:  # no start was improved as far
-        starts.append(flights[best_yet])
+        reached = {name: value(flight) for name, flight in improved.items()}
+    first, then = (max(each, key=each.__getitem__) for each in (begun, reached))
+    starts, best_yet = [improved[name] for name in going], improved[then]
+    if begun[first] > reached[then]:  # no start was improved as far
+        best_yet = routes[first]
+        starts.append(best_yet)
+    tell(2, "the best start", max(begun[first], reached[then]))
     warm = len(routes) > 1
     optima = [_followed(problem, field, start, steps, warm=warm) for start in starts]
-    by_start = dict(zip(routes, values[len(routes) :], strict=True))
-    by_start |= {name: value(end.trajectory) for name, end in zip(going, optima, strict=False)}
+    ends = {name: value(end.trajectory) for name, end in zip(going, optima, strict=False)}
     best = _best(problem, field, optima)
     if isinstance(own_steps, RateSteps):
-        start = replace(best, trajectory=flights[best_yet])
-        best = _sharpened(problem, scheme, [*optima, start], steps)
+        best = _sharpened(problem, scheme, [*optima, replace(best, trajectory=best_yet)], steps)
     if spread_known(problem):
         best = _under_shadowing(problem, field, best)
     flight = best.trajectory
@@ -119,25 +116,23 @@ def direct(
         _precoders(link, rate, scheme, flight.w)
         for link, rate in zip(field.links, field.rates, strict=True)
     ]
-    residual = f"stationary to {best.residual:.1e}"
+    ending = f"stationary to {best.residual:.1e}"
+    if not best.converged:
+        ending = f"stopped after {best.iterations} steps, {ending}"
     solution = make_solution(
-        problem,
-        flight,
-        precoders,
-        [],
-        converged=best.converged,
-        ending=residual if best.converged else f"stopped after {best.iterations} steps, {residual}",
+        problem, flight, precoders, [], converged=best.converged, ending=ending
     )
-    reached = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
+    found = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
     # values by tables may be above those of the precoders, and without shadowing more is delivered
-    history = np.maximum.accumulate([values[0], *values[len(routes) :]])
+    history = np.maximum.accumulate([*list(begun.values())[:1], *reached.values()])
+    gain = None
+    if before is not None:
+        gain = found - _worth(problem, before.w, [before.P_B, before.P_U])
     return replace(
         solution,
-        history=np.append(np.minimum(history, reached), reached),
-        starts={name: min(each, reached) for name, each in by_start.items()},
-        gain=None
-        if before is None
-        else reached - _worth(problem, before.w, [before.P_B, before.P_U]),
+        history=np.append(np.minimum(history, found), found),
+        starts={name: min(each, found) for name, each in (reached | ends).items()},
+        gain=gain,
     )
 
 
