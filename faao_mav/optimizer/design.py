@@ -5,7 +5,6 @@ The paper compares four: precoders that are optimal for the alphabet or of a cla
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -13,9 +12,6 @@ from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.optimizer.problem import Link, OwnPrecoder
 from faao_mav.plan import Plan
 from faao_mav.radio.precoder import SCHEMES
-
-Draws: TypeAlias = Complex
-"""Channels of (1) or (2), (..., N_r, N_t); the first axis is that of the draws if `averaged`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +41,12 @@ class Design:
         """Whether precoders maximise the rate that counts, `Link.measure`."""
         return self.scheme == "faao" and not self.gaussian and self.own is None
 
-    def precoders(self, link: Link, H: Draws, start: Complex | None = None) -> Complex:
-        """Return precoders (..., N_t, N_t) of power W for the channels `H`.
+    def precoders(self, link: Link, H: Complex, start: Complex | None = None) -> Complex:
+        """Return precoders (..., N_t, N_t) of power W for the channels `H` (..., N_r, N_t).
 
-        The search for optimal ones begins at `start` (..., N_t, N_t) where given. A classical
-        scheme that does not know the draw is that of the mean channel.
+        The first axis is that of the draws if `averaged`. The search for optimal ones begins at
+        `start` (..., N_t, N_t) where given. A classical scheme that does not know the draw is that
+        of the mean channel.
         """
         power, noise = link.power, link.noise
         if self.optimal:
@@ -59,7 +56,7 @@ class Design:
         scheme = "waterfilling" if self.scheme == "faao" else self.scheme
         return (self.own or SCHEMES[scheme])(H, power, noise)
 
-    def rate(self, link: Link, H: Draws, P: Complex) -> Real:
+    def rate(self, link: Link, H: Complex, P: Complex) -> Real:
         """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""
         rate = gaussian_rate(H, P, link.noise) if self.gaussian else link.draw_rates(H, P)
         return np.asarray(rate.mean(axis=0)) if self.averaged else rate

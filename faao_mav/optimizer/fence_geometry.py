@@ -45,11 +45,12 @@ class ConvexObstacles:
     radius: Real
 
     @classmethod
-    def of(cls, pieces: Sequence[Real], radii: Sequence[float]) -> "ConvexObstacles":
+    def of(cls, pieces: Sequence[tuple[Real, float]]) -> "ConvexObstacles":
         """Return the obstacles with these corners, (k, 2) each, and radii, m."""
-        most = max(map(len, pieces), default=1)
-        padded = [np.vstack([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in pieces]
-        return cls(np.array(padded).reshape(-1, most, 2), np.array(radii, dtype=np.float64))
+        most = max((len(piece) for piece, _ in pieces), default=1)
+        padded = [np.pad(piece, ((0, most - len(piece)), (0, 0)), "edge") for piece, _ in pieces]
+        radii = np.array([radius for _, radius in pieces], dtype=np.float64)
+        return cls(np.array(padded).reshape(-1, most, 2), radii)
 
     def only(self, kept: Flags) -> "ConvexObstacles":
         """Return those obstacles that are `kept` (P,)."""
@@ -195,39 +196,31 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     ]
     if len(inclusions) > 1 and inside is not None and plan.any_inclusion:
         inclusions = [inside.buffer(-_SIMPLER).simplify(_SIMPLER)]
-    pieces: list[Real] = []
-    radii: list[float] = []
-    sides: list[tuple[Real, Real]] = []
+    pieces = list[tuple[Real, float]]()  # corners and radius
+    sides = [(np.empty((0, 2)), np.empty(0))]
     for shape in inclusions:
         hull = shapely.orient_polygons(shape.convex_hull)
         sides.append(_sides(shapely.get_coordinates(hull)))
-        pieces += convex_pieces(hull - shape)
-    radii += [0.0] * len(pieces)
+        pieces += [(piece, 0.0) for piece in convex_pieces(hull - shape)]
     for zone in zones:
         if zone.inclusion or (inside is not None and not zone.shape.intersects(inside)):
             continue
-        if zone.disc is not None:
-            east, north, radius = zone.disc
-            pieces.append(np.array([[east, north]]))
-            radii.append(radius * OUTSIDE)
+        if zone.disc is None:
+            pieces += [(piece, 0.0) for piece in convex_pieces(zone.shape)]
         else:
-            parts = convex_pieces(zone.shape)
-            pieces += parts
-            radii += [0.0] * len(parts)
-    ends = shapely.points([plan.flight.start, plan.flight.end])
+            pieces.append((np.array([zone.disc[:2]]), zone.disc[2] * OUTSIDE))
     if plan.map_edge is not None:
         (west, south), (east, north) = plan.map_edge
         sides.append(_sides(shapely.get_coordinates(shapely.box(west, south, east, north))))
+    ends = shapely.points([plan.flight.start, plan.flight.end])
     most = plan.max_ground_speed * plan.flight.duration + 2 * plan.margin
     near = [
-        k
-        for k, (piece, radius) in enumerate(zip(pieces, radii, strict=True))
+        (piece, radius)
+        for piece, radius in pieces
         if shapely.distance(shapely.MultiPoint(piece).convex_hull, ends).sum() - 2 * radius <= most
     ]
-    normals = np.concatenate([normal for normal, _ in sides]) if sides else np.empty((0, 2))
-    offsets = np.concatenate([offset for _, offset in sides]) if sides else np.empty(0)
-    obstacles = ConvexObstacles.of([pieces[k] for k in near], [radii[k] for k in near])
-    return FenceGeometry(obstacles, normals, offsets, plan.margin)
+    normals, offsets = (np.concatenate(each) for each in zip(*sides, strict=True))
+    return FenceGeometry(ConvexObstacles.of(near), normals, offsets, plan.margin)
 
 
 def _sides(corners: Real) -> tuple[Real, Real]:

@@ -47,7 +47,7 @@ def test_separation_is_the_distance_of_shapely(
     if outline.geom_type != "Polygon" or outline.area < 1:
         return
     corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
-    obstacles = ConvexObstacles.of([corners], [radius])
+    obstacles = ConvexObstacles.of([(corners, radius)])
     u, h = obstacles.separation(np.array([a]).T, np.array([b]).T)
     apart = min(float(u[:, 0, 0] @ end) for end in (a, b)) - float(h[0, 0])
     distance = outline.distance(shapely.LineString([a, b])) - radius
@@ -73,7 +73,7 @@ def test_clearance_is_that_of_the_continuous_path(
     kin = Kinematics(np.array(way[0]), np.array(way[-1]), n, 1.0, speed, speed, None, None, True)
     flight = kin.follow(np.array(way) * 0.3)
     corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
-    fence = FenceGeometry(ConvexObstacles.of([corners], [0.0]), np.empty((0, 2)), np.empty(0), 5.0)
+    fence = FenceGeometry(ConvexObstacles.of([(corners, 0.0)]), np.empty((0, 2)), np.empty(0), 5.0)
     path = dense_path(flight.w, flight.v, flight.a, 1.0, 200)
     told, true = fence.clearance(flight, 1.0), shapely.LineString(path).distance(outline)
     assert told <= true + 1e-6

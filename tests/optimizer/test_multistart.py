@@ -16,7 +16,7 @@ from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search import multistart
 from faao_mav.optimizer.search.multistart import (
     COARSE_SLOTS,
-    BlockStage,
+    block_stage,
     improve_starts,
 )
 from faao_mav.optimizer.search.starts import starts
@@ -52,11 +52,11 @@ def test_a_block_has_the_mean_of_its_slots() -> None:
         return StageValues(value, slope, np.zeros((3, 2, 501)))
 
     w = rng.normal(size=(2, COARSE_SLOTS))
-    found = BlockStage(stage, 501, COARSE_SLOTS)(w)
+    found = block_stage(stage, 501, COARSE_SLOTS)(w)
     held = w[:, np.rint(np.arange(501) * (COARSE_SLOTS - 1) / 500).astype(int)]
     assert found.value.mean(axis=1) == pytest.approx(stage(held).value.mean(axis=1))
     shift = rng.normal(size=w.shape)
-    moved = BlockStage(stage, 501, COARSE_SLOTS)(w + shift).value - found.value
+    moved = block_stage(stage, 501, COARSE_SLOTS)(w + shift).value - found.value
     assert moved == pytest.approx(np.einsum("cjn,cn->jn", found.gradient, shift))
 
 

@@ -87,12 +87,6 @@ class TableRate:
     table: Table
     still: tuple[Real, Real] | None
 
-    @property
-    def exact(self) -> bool:
-        """Whether no searched precoders were interpolated between known draws."""
-        closed = self.link.closed_form and self.link.measure == "cutoff"
-        return self.kind != "modes" or closed
-
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (..., n)."""
         shift, y = self.still or _shifted(self.link, self.kind, cosine)

@@ -4,7 +4,7 @@ Long flights are improved on a coarse copy with fewer slots, which costs a fract
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,30 +35,21 @@ EQUAL = 1e-6
 is then up to rounding, and differs from machine to machine. Chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class BlockStage:
-    """The rewards of `slots` positions, each of which stands for a block of the slots of `stage`.
+def block_stage(stage: Stage, fine: int, slots: int) -> Stage:
+    """Return the rewards of `slots` positions, each standing for a block of the slots of `stage`.
 
     (1 / slots) sum_m F_m is the mean of `stage` over its `fine` slots with w_n = w_m(n), so that
     every draw of the fading counts.
     """
+    block = np.rint(np.linspace(0, slots - 1, fine)).astype(int)
+    first = np.searchsorted(block, np.arange(slots))
 
-    stage: Stage
-    fine: int
-    slots: int
+    def of_blocks(w: Real) -> StageValues:
+        at = stage(w[..., block])
+        parts = (at.value, at.gradient, at.hessian)
+        return StageValues(*(np.add.reduceat(x, first, axis=-1) * slots / fine for x in parts))
 
-    def __call__(self, w: Real) -> StageValues:
-        """Return values (J, ..., slots), gradients and Hessians at positions w (2, ..., slots)."""
-        block = np.rint(np.linspace(0, self.slots - 1, self.fine)).astype(int)
-        first = np.searchsorted(block, np.arange(self.slots))
-        at = self.stage(w[..., block])
-        share = self.slots / self.fine
-        return StageValues(
-            *(
-                np.add.reduceat(part, first, axis=-1) * share
-                for part in (at.value, at.gradient, at.hessian)
-            )
-        )
+    return of_blocks
 
 
 def improve_starts(
@@ -74,7 +65,7 @@ def improve_starts(
     reward, tolerance = stage, ROUGH
     if kin.slots >= FEWEST_SLOTS and kin.min_speed == 0 and problem.energy == np.inf:
         copy, tolerance = coarse_copy(kin), _COARSE_TOLERANCE
-        reward = BlockStage(stage, kin.slots, COARSE_SLOTS)
+        reward = block_stage(stage, kin.slots, COARSE_SLOTS)
     kept, optima = problem.constraints(copy), {}
     for name, flight in flights.items():
         start = flight if copy is kin else copy.follow(paced(copy, flight, kin.time_step))
