@@ -185,32 +185,32 @@ class Kinematics:
         """Return the largest violation of each constraint, in its own unit; 0 where it holds."""
         w, v, a, dt = trajectory.w, trajectory.v, trajectory.a, self.time_step
         speed, acceleration = np.linalg.norm(v, axis=1), np.linalg.norm(a, axis=1)
-        airspeed = np.linalg.norm(v - self.wind, axis=1)
-        bounded = acceleration[self.first_bounded_acceleration :]
-        found = {
-            "(11) position": _largest(w[1:] - w[:-1] - v[:-1] * dt - a[:-1] * dt**2 / 2),
-            "(12) velocity": _largest(v[1:] - v[:-1] - a[:-1] * dt),
-            "(13d) ends": max(_largest(w[0] - self.start), _largest(w[-1] - self.end)),
-            "(13e) speed": float(max(0.0, speed.max() - self.max_speed)),
-            "(13f) acceleration": float(max(0.0, bounded.max() - self.max_acceleration)),
+        airspeed, first = np.linalg.norm(v - self.wind, axis=1), self.first_bounded_acceleration
+        missed = {
+            "(11) position": w[1:] - w[:-1] - v[:-1] * dt - a[:-1] * dt**2 / 2,
+            "(12) velocity": v[1:] - v[:-1] - a[:-1] * dt,
+            "(13d) ends": w[[0, -1]] - [self.start, self.end],
         }
         if self.start_velocity is not None:
-            found["start velocity"] = _largest(v[0] - self.start_velocity)
+            missed["start velocity"] = v[0] - self.start_velocity
         if self.end_velocity is not None:
-            found["end velocity"] = _largest(v[-1] - self.end_velocity)
+            missed["end velocity"] = v[-1] - self.end_velocity
+        beyond = {
+            "(13e) speed": speed - self.max_speed,
+            "(13f) acceleration": acceleration[first:] - self.max_acceleration,
+        }
         if self.min_speed > 0:
-            found["minimum speed"] = float(max(0.0, self.min_speed - airspeed.min()))
+            beyond["minimum speed"] = self.min_speed - airspeed
         if math.isfinite(self.most_fall):
-            first = self.first_bounded_acceleration
-            fall, power = np.diff(airspeed)[first:] / -dt, np.diff(airspeed**2)[first:] / (2 * dt)
-            found["fall of airspeed"] = float(max(0.0, fall.max() - self.most_fall))
-            found["power of airspeed"] = float(max(0.0, power.max() - self.most_power))
+            power = np.diff(airspeed**2)[first:] / (2 * dt)
+            beyond["fall of airspeed"] = np.diff(airspeed)[first:] / -dt - self.most_fall
+            beyond["power of airspeed"] = power - self.most_power
         if math.isfinite(self.most_turn):
-            beyond = acceleration[:-1] - self.turn_limits(v)
-            found["turn"] = float(max(0.0, beyond[self.first_bounded_acceleration :].max()))
+            beyond["turn"] = (acceleration[:-1] - self.turn_limits(v))[first:]
         if math.isfinite(self.max_airspeed):
-            found["airspeed"] = float(max(0.0, airspeed.max() - self.max_airspeed))
-        return found
+            beyond["airspeed"] = airspeed - self.max_airspeed
+        found = {name: float(np.abs(each).max()) for name, each in missed.items()}
+        return found | {name: float(max(0.0, each.max())) for name, each in beyond.items()}
 
     def integrate(self, start_velocity: Real, acceleration: Real) -> Trajectory:
         """Follow (11) and (12) exactly from w_I with v(0) (2,) and a(n) (N + 2, 2).
@@ -270,7 +270,3 @@ def kinematics(plan: Plan) -> Kinematics:
         most_power=rates.power,
         most_turn=rates.turn,
     )
-
-
-def _largest(values: Real) -> float:
-    return float(np.abs(values).max())
