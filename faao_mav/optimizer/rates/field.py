@@ -104,12 +104,12 @@ def rate_models(
 
     `farthest` are the largest horizontal distances from their stations, in metres, that they cover.
     """
-    tabled, spans = [], []
-    for link, distance in zip(links, farthest, strict=True):
-        if kind_of(link, design):
-            tabled.append(link)
-            spans.append(np.array(link.gains.extremes(distance)))
-    tables = iter(table_rates(tabled, design, spans))
+    tabled = [
+        (link, np.array(link.gains.extremes(distance)))
+        for link, distance in zip(links, farthest, strict=True)
+        if kind_of(link, design)
+    ]
+    tables = iter(table_rates(tabled, design))
     return tuple(
         next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links
     )

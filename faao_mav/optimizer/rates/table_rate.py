@@ -148,15 +148,13 @@ def _few_modes(link: Link) -> bool:
     return link.steps is not None or min(link.receive, link.transmit) <= 2
 
 
-def table_rates(
-    links: Sequence[Link], design: Design, spans: Sequence[Real]
-) -> tuple[TableRate, ...]:
-    """Return the rates of `links`, all of which have a `kind_of` table, between the l of `spans`.
+def table_rates(links: Sequence[tuple[Link, Real]], design: Design) -> tuple[TableRate, ...]:
+    """Return the rates of `links` that have a `kind_of` table, each over a span of l.
 
     Links of known draws share a table if they have one alphabet and one number of modes.
     """
     rates, ranges = [], []
-    for link, span in zip(links, spans, strict=True):
+    for link, span in links:
         kind = kind_of(link, design)
         assert kind is not None
         moving = link.follows_position and kind == "modes"
@@ -237,7 +235,7 @@ def _made(unit: Link, design: Design, x: Real, y: Real, H: Complex) -> Table:
     """Return the table of the channels H ((S,) k, N_r, N_t) of each y, of unit power and noise."""
     seen = design.optimal and design.averaged and not design.blind
     if seen and _few_modes(unit):  # the best rates of all draws are in one table
-        (of_each,) = table_rates([unit], replace(design, averaged=False), [x[[0, -1]]])
+        (of_each,) = table_rates([(unit, x[[0, -1]])], replace(design, averaged=False))
         mean = of_each.value(x, 0 * x).mean(axis=0)
         P = of_each.initial_precoders(x, 0 * x)[..., None, :, :]
         return Table(Spline.through(x, y, mean[:, None]), P)

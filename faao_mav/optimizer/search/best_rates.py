@@ -87,7 +87,7 @@ def best_at(problem: Problem, link: Link, gain_log: Real) -> tuple[Real, bool]:
         link = replace(link, line_of_sight="all_ones", nlos=H_r, rician_factor=0.0)
     if kind_of(link, optimal):
         span = np.array([gain_log.min(), gain_log.max()])
-        (table,) = table_rates([link], optimal, [span])
+        (table,) = table_rates([(link, span)], optimal)
         return table.value(gain_log, gain_log).T, not optimal.averaged and exact
     # One gain after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
