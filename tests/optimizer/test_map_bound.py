@@ -20,7 +20,7 @@ from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.best_rates import BestRates, best_rates
 from faao_mav.optimizer.search.map_bound import MapBound, map_bound
 from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.optimizer.search.sweep import Cells, cells_of
+from faao_mav.optimizer.search.sweep import Cells, cells_of, largest_near
 from faao_mav.plan import parse_plan
 
 WALL = {
@@ -53,25 +53,26 @@ def cells_about(kin: Kinematics) -> Cells:
     return cells_of(kin, np.array([[0.0, 0.0], [60.0, 60.0]]), 150, 2.5)
 
 
-def test_a_sweep_is_the_best_over_all_sequences_of_cells(small_plan: MakePlan) -> None:
+def test_a_step_reaches_every_cell_that_v_max_does(small_plan: MakePlan) -> None:
     kin = build_problem(small_plan()).kinematics
-    sweep = cells_about(kin)
-    rng = np.random.default_rng(0)
-    shape = sweep.alive.shape
-    rewards = np.where(sweep.alive[:, None], rng.random((shape[0], 2, *shape[1:])), -np.inf)
-    step = kin.max_speed * float(np.diff(sweep.instants).max())
-    flat = sweep.x.reshape(2, -1)
-    apart = np.maximum(0.0, np.abs(flat[:, :, None] - flat[:, None]) - sweep.side)
+    cells = cells_about(kin)
+    values = np.random.default_rng(0).random((2, *cells.x.shape[1:]))
+    step = kin.max_speed * float(np.diff(cells.instants).max())
+    flat = cells.x.reshape(2, -1)
+    apart = np.maximum(0.0, np.abs(flat[:, :, None] - flat[:, None]) - cells.side)
     reached = np.hypot(*apart) <= step * (1 + 1e-12)
-    best = rewards.reshape(*rewards.shape[:2], -1).copy()
-    for k in range(len(best) - 2, -1, -1):
-        best[k] += np.where(reached, best[k + 1][:, None], -np.inf).max(axis=-1)
-    values = sweep.backward(rewards)
-    assert values.reshape(best.shape) == pytest.approx(best)
-    through = sweep.through(rewards)
-    assert through.max(axis=(-2, -1)) == pytest.approx(
-        np.broadcast_to(values[0].max(axis=(-2, -1)), through.shape[:2])
-    )
+    best = np.where(reached, values.reshape(2, 1, -1), -np.inf).max(axis=-1)
+    assert largest_near(values, cells.rows).reshape(2, -1) == pytest.approx(best)
+
+
+def test_falling_prices_part_flights_that_never_meet(small_plan: MakePlan) -> None:
+    """What one flight takes in near one station another cannot forward near the other."""
+    faint = {"radio.base_station.power_dbm": -20, "radio.relay.power_dbm": -20}
+    changes = {"radio.causal": True, "radio.fading": "none", "radio.gain": {"exponent": 3}}
+    problem = build_problem(small_plan(faint | changes))
+    cells = MapBound.over(problem, best_rates(problem), 2000, 6.0)
+    prices = np.linspace(0, 1, 21).tolist()
+    assert cells.bound(prices) < 0.95 * min(cells.bound([price]) for price in prices)
 
 
 @settings(max_examples=30)

@@ -141,7 +141,7 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         inside = problem.free_area.inside(room * found.side).covers(x.T)
         near = np.hypot(*(x - ends[:, :, None]).swapaxes(0, 1)).min(axis=0) < 2 * found.side
         inside |= near & problem.free_area.covers(x.T)
-        found = replace(found, alive=found.alive & inside.reshape(found.free.shape))
+        found = replace(found, alive=found.alive & inside.reshape(found.x.shape[1:]))
     if any(link.gains.station.ndim > 1 for link in problem.links):
         slots = [int(block[len(block) // 2]) for block in found.blocks]
         fields = [field.in_slot(slot) for slot in slots]

@@ -1,10 +1,9 @@
 """Cells of the map at instants of a flight, and the best sums over them: by position alone.
 
 What is to be had from an instant on is worth to a flight in a cell its reward there and the best of
-the cells that it can reach at v_max: a maximum filter with a disc, from the end to the start; the
-same from the start on says what the best flight through a cell is worth. Acceleration enters
-through how far the flight comes from its ends, fences by cells that are left out. Cells and steps
-are rounded outwards, so that no flight is missed.
+the cells that it can reach at v_max: a maximum filter with a disc, from the end to the start.
+Acceleration enters through how far the flight comes from its ends, fences by cells that are left
+out. Cells and steps are rounded outwards, so that no flight is missed.
 """
 
 from collections.abc import Iterable, Sequence
@@ -19,10 +18,6 @@ from faao_mav.optimizer.kinematics import Kinematics
 CORNER = np.sqrt(0.5)
 """Distance of a cell's corners from its centre, in sides of the cell."""
 
-_FENCED_REACH = 4.0
-"""Cells that a step reaches beside a fence, about: what is thinner may be passed through. Chosen.
-Fewer make flights faster, by a cell for each stage."""
-
 _THINNEST = 0.02
 """Least width of the map, in its length: stations and ends may lie on one line. Chosen."""
 
@@ -36,9 +31,9 @@ class Cells:
 
     `x` (2, i, j) are the centres of the cells, m, `side` theirs; `blocks` the K runs of slots
     between the first and the last, which are at given places, and `instants` (K,) their mean times,
-    s. `alive` (K, i, j) tells where a flight can be at an instant, `free` (i, j) where the fence
-    lets it be. A step from one instant to the next has `stages`, which all end in `free`; `rows`
-    is what one of these reaches: by how many rows to either side, and how many columns there.
+    s. `alive` (K, i, j) tells where a flight can be at an instant. `rows` is what a step from one
+    instant to the next reaches: by how many rows to either side, and how many columns there. It may
+    pass through an obstacle that is thinner.
     """
 
     x: Real
@@ -47,42 +42,19 @@ class Cells:
     instants: Real
     alive: Flags
     rows: list[tuple[int, int]]
-    stages: int
-    free: Flags
-
-    def backward(self, rewards: Real) -> Real:
-        """Return the best sums (K, ..., i, j) from each instant on, its own reward included.
-
-        `rewards` (K, ..., i, j) are those of the instants; -inf where no flight can be.
-        """
-        out = np.empty_like(rewards)
-        out[-1] = rewards[-1]
-        for k in range(len(rewards) - 2, -1, -1):
-            after = largest_near(out[k + 1], self.rows)
-            for _ in range(self.stages - 1):
-                after = largest_near(np.where(self.free, after, -np.inf), self.rows)
-            out[k] = rewards[k] + after
-        return out
-
-    def through(self, rewards: Real) -> Real:
-        """Return what the best flight through each cell at each instant is worth, as `rewards`."""
-        after, before = self.backward(rewards), self.backward(rewards[::-1])[::-1]
-        with np.errstate(invalid="ignore"):  # -inf - -inf: nobody comes there
-            return np.nan_to_num(after + before - rewards, nan=-np.inf, neginf=-np.inf)
 
 
-def disc(step: float, beyond: int = 1) -> list[tuple[int, int]]:
+def disc(step: float, beyond: float = 1) -> list[tuple[int, int]]:
     """Return rows to either side, and columns there, from any point of a cell `step` sides away.
 
-    With 0 `beyond` they are from centre to centre.
+    With 0 `beyond` they are from centre to centre, with 0.5 from a centre to any point.
 
     >>> disc(1.5)
     [(0, 2), (1, 2), (2, 2)]
     """
     return [
-        (row, int(np.sqrt(step**2 - max(0, row - beyond) ** 2)) + beyond)
-        for row in range(int(step) + 2)
-        if row - beyond <= step
+        (row, int(np.sqrt(step**2 - max(0, row - beyond) ** 2) + beyond))
+        for row in range(int(step + beyond) + 1)
     ]
 
 
@@ -154,9 +126,8 @@ def cells_of(
     if free is not None:
         area = FreeArea(free.shape.buffer(CORNER * side))
         inside = area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
-    stages = 1 if free is None else max(1, round(reach / _FENCED_REACH))
-    step = kin.max_speed * float(np.diff(instants).max(initial=0.0)) / side / stages
-    return Cells(x, side, blocks, instants, alive & inside, disc(step), stages, inside)
+    step = kin.max_speed * float(np.diff(instants).max(initial=0.0)) / side
+    return Cells(x, side, blocks, instants, alive & inside, disc(step))
 
 
 def _edges(free: FreeArea, kin: Kinematics, reach: float) -> Real:
