@@ -1,6 +1,7 @@
 """What a plan names by a file that lies beside it, put in its place."""
 
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +56,26 @@ def filled_in(data: dict[str, Any], source: str) -> Iterator[tuple[tuple[str, ..
                 place = f"{place}.map"
             law = _holder(data, (*keys, "map"))
             if path := _file(law.get("map"), folder):
-                law["map"] = map_word(read_map(path))
+                law["map"] = _word(path, _version(path))
                 yield (*keys, "map"), str(path)
         except InputError as error:
             raise PlanError(f"{place}: {error}") from None
+
+
+def _version(path: Path) -> tuple[int, int] | None:
+    """Return what tells a file from what it was before; None where it cannot be read."""
+    try:
+        told = path.stat()
+    except (OSError, ValueError):
+        return None
+    return told.st_mtime_ns, told.st_size
+
+
+@lru_cache(maxsize=8)
+def _word(path: Path, version: tuple[int, int] | None) -> str:
+    """Return the word of a map's file: the page reads its plan anew at every change of it."""
+    del version
+    return map_word(read_map(path))
 
 
 def _holder(data: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:

@@ -55,12 +55,16 @@ class Whereabouts:
             return self.from_home <= HOME_AWAY and abs(self.higher or 0.0) <= HOME_HIGHER
         return self.from_first is None or self.from_first <= FIRST_AWAY
 
+    @property
+    def height_shown(self) -> str:
+        """By how much it stands higher or lower, for people."""
+        if self.higher is None:
+            return "how much higher is not known"
+        return f"{abs(self.higher):.0f} m {'lower' if self.higher < 0 else 'higher'}"
+
     def __str__(self) -> str:
         if self.from_home is not None:
-            height = "how much higher is not known"
-            if self.higher is not None:
-                height = f"{abs(self.higher):.0f} m {'lower' if self.higher < 0 else 'higher'}"
-            return f"{shown(self.from_home)} from the mission's home, {height}"
+            return f"{shown(self.from_home)} from the mission's home, {self.height_shown}"
         if self.from_first is not None:
             return f"{shown(self.from_first)} from the mission's first place; it tells no home"
         return "the mission tells no place"

@@ -63,7 +63,7 @@ def test_no_gain_within_a_disc_is_above_its_most(
 ) -> None:
     field = with_maps(build_problem(small_plan(FAINT)), rough_grid(seed), rough_grid(seed)).links[0]
     rng = np.random.default_rng(seed)
-    axes = [rng.uniform(-80, 160) + rng.uniform(0.2, 20) * np.arange(3)] * 2
+    axes: list[Real] = [rng.uniform(-80, 160) + rng.uniform(0.2, 20) * np.arange(3.0)] * 2
     angle, share = rng.uniform(0, 2 * np.pi, (9, 300)), np.sqrt(rng.random((9, 300)))
     w = np.stack(np.meshgrid(*axes, indexing="ij")).reshape(2, 9, 1)
     near = w + off * share * np.stack([np.cos(angle), np.sin(angle)])
