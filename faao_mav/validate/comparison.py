@@ -156,7 +156,8 @@ def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
     lost = np.concatenate([[0.0], np.cumsum(loss)]) / len(loss)
     # The sum from slot i to slot j - 1 is lost[j] - lost[i], the greatest over the least before.
     end = int(np.argmax(lost - np.minimum.accumulate(lost)))
-    begin = int(np.argmin(lost[: end + 1]))
+    before = lost[: end + 1]
+    begin = int(np.flatnonzero(before <= before.min() + _LEAST / 100)[-1])  # digits apart, the last
     if lost[end] - lost[begin] < _LEAST:
         return None
     ends = solution.t[end - 1] + solution.t[1] - solution.t[0]
