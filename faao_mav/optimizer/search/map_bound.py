@@ -105,14 +105,12 @@ class MapBound:
         p = np.unique(np.clip(prices, 0.0, 1.0))
         queue, kin = self.problem.maximised_queue, self.problem.kinematics
         first, last = (at_ends(self.problem, self.rates, price) for price in (1.0, 0.0))
-        worth: dict[int, Real] = {}
+        worth, count = np.zeros(1), 0
         best = ((1 - p) * last)[:, None, None]
         for k in reversed(range(len(self.cells.blocks))):
-            key = k if self.own else len(self.cells.blocks[k])
-            if key not in worth:
-                worth = {} if self.own else worth
-                worth[key] = self._of_run(k, p)
-            best = np.where(self.cells.alive[k], worth[key] + best, -np.inf)
+            if self.own or len(self.cells.blocks[k]) != count:
+                worth, count = self._of_run(k, p), len(self.cells.blocks[k])
+            best = np.where(self.cells.alive[k], worth + best, -np.inf)
             if queue is not None:
                 best = np.minimum.accumulate(best, axis=0)
             if k:
@@ -124,7 +122,7 @@ class MapBound:
 
         It is flown at one of a few velocities, and rates are rounded outwards to all between them.
         """
-        kin, cells, half = self.problem.kinematics, self.cells, self._half
+        kin, cells = self.problem.kinematics, self.cells
         slots = cells.blocks[k]
         tau = slots * kin.time_step - float(cells.instants[k])
         velocities, gap = self._velocities(slots)
@@ -140,30 +138,33 @@ class MapBound:
         # how far w_n may be from where the cell's centre and the velocity would have it
         off = CORNER * (cells.side + side * (parts > 1)) + gap * np.abs(tau)
         off += kin.max_acceleration * tau**2 / 2
-        levels = np.ceil(off / (_NEARER * cells.side)).astype(int)
-        tables: dict[tuple[int, int], Real] = {}
+        levels = np.ceil(off / (_NEARER * cells.side)).astype(int).tolist()
+        own = slots.tolist() if self.own else [0] * len(slots)
+        keys = list(zip(levels, own, strict=True))
+        tables = {key: self._table(*key, axes, p) for key in set(keys)}
+        best = np.full((len(p), rows, columns), -np.inf)
+        for v in range(len(velocities)):
+            worth = np.zeros((len(p) if self._half else 2, rows, columns))
+            for key, (row, column) in zip(keys, (margin + shifts[:, v]).tolist(), strict=True):
+                worth += tables[key][:, row::parts, column::parts][:, :rows, :columns]
+            for price, each in enumerate(p.tolist()):
+                here = worth[price] if self._half else each * worth[0] + (1 - each) * worth[1]
+                np.maximum(best[price], here, out=best[price])
+        return best
+
+    def _table(self, level: int, slot: int, axes: Sequence[Real], p: Real) -> Real:
+        """Return the most rates of both links about the points of `axes` (2, i, j), bits.
+
+        About them is within `level` times `_NEARER` sides of a cell. In half duplex it is what the
+        `slot` is worth at the prices `p` (B,): (B, i, j).
+        """
+        off = level * _NEARER * self.cells.side
+        U, G = (
+            self.rates.at(j, slot, most_gain(link.gains.in_slots(slot), axes, off))
+            for j, link in enumerate(self.problem.links)
+        )
         price = p[:, None, None]
-        found = np.zeros((len(p) if half else 2, len(velocities), rows, columns))
-        for n, level in enumerate(levels.tolist()):
-            key = level, n if self.own else 0
-            if key not in tables:
-                tables = {} if self.own else tables
-                U, G = (
-                    self.rates.at(
-                        j,
-                        int(slots[n]),
-                        most_gain(
-                            link.gains.in_slots(int(slots[n])), axes, level * _NEARER * cells.side
-                        ),
-                    )
-                    for j, link in enumerate(self.problem.links)
-                )
-                tables[key] = np.maximum(price * U, (1 - price) * G) if half else np.stack([U, G])
-            for v, (row, column) in enumerate((margin + shifts[n]).tolist()):
-                found[:, v] += tables[key][:, row::parts, column::parts][:, :rows, :columns]
-        if half:
-            return np.asarray(found.max(axis=1))
-        return np.stack([(x * found[0] + (1 - x) * found[1]).max(axis=0) for x in p.tolist()])
+        return np.maximum(price * U, (1 - price) * G) if self._half else np.stack([U, G])
 
     def _velocities(self, slots: Integers) -> tuple[Real, float]:
         """Return the velocities (V, 2) of a run of `slots`, and how far others are off them, m/s.
