@@ -111,19 +111,27 @@ class _UniqueKeys(SafeConstructor):
         return True
 
 
-class _ShortWords(SafeRepresenter):
+_LINES = re.compile(r"([!-~][ -~]*\n){2,}")
+"""Text of several lines that stands in a block as it is."""
+
+
+class _Blocks(SafeRepresenter):
+    """Writes text of several lines, as a track, line by line, and long words by short ones."""
+
     def represent_str(self, data: str) -> Any:
-        return super().represent_str(_without_words(self.dumper.long, data))
+        style = "|" if _LINES.fullmatch(data) else None
+        short = _without_words(self.dumper.long, data)
+        return self.represent_scalar("tag:yaml.org,2002:str", short, style=style)
 
 
-_ShortWords.add_representer(str, _ShortWords.represent_str)
+_Blocks.add_representer(str, _Blocks.represent_str)
 
 
 def _yaml() -> Any:
     """Return what reads and writes; its `long` are the words for which others stand."""
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.long = {}
-    yaml.Representer = _ShortWords
+    yaml.Representer = _Blocks
     yaml.Resolver, yaml.Composer, yaml.Constructor = _CoreResolver, _PlainComposer, _UniqueKeys
     return yaml
 
