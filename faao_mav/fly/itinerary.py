@@ -176,7 +176,7 @@ class Itinerary:
         self.part: Part = "take-off"
         self.relay_start: float | None = None
         self.trouble: str | None = None
-        self._time = math.inf
+        self._time = math.nan
         self._led, self._meets = False, 0.0
         self._follow(None, 0.0)
 
@@ -185,7 +185,7 @@ class Itinerary:
 
         `velocity` (3,) is in m/s; all are east, north and up of the plan's origin.
         """
-        passed, self._time = max(t - self._time, 0.0), t
+        passed, self._time = 0.0 if math.isnan(self._time) else t - self._time, t
         low = place[2] < self._plan.flight.altitude - _BELOW
         late = self._arrived is not None and t >= self._arrived + _UNSETTLED
         match self.part:

@@ -210,8 +210,9 @@ class Stream(Watch):
             self.seen.told.append(f"{what}: setpoints keep to that of the departure")
         over = self.flight.part == "over" and self.seen.custom_mode == self._flown
         if self.phase == "flying" and over:
-            self.phase, self._path = "ending", (self._flown, self._finish)
+            self._path = (self._flown, self._finish)
             self._set_mode(now, self._finish)
+            self.phase = "ending"
         if self.phase == "engaging":
             self._repeat(now)
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Held, Kind, Telemetry, read_held
 from faao_mav.validate.rule import Finding, Level
-from faao_mav.wire.machine import Machine, Progress, Script
+from faao_mav.wire.machine import Machine, Script
 from faao_mav.wire.messages import (
     CommandAck,
     CommandLong,
@@ -105,8 +105,6 @@ class Watch(Machine[Ending]):
 
     streams = False
     """Whether it is not the mission that is flown, but a plan by setpoints."""
-
-    progress: Progress = ("watching", 0, 0)
 
     def __init__(
         self,
@@ -394,10 +392,11 @@ class Watch(Machine[Ending]):
 
     def _ask_to_hold(self, now: float) -> None:
         """Ask the vehicle to hold, until it does."""
-        self._path = (*self._path, self._modes.hold)
+        hold = self._modes.hold
+        self._path = self._path if self._path[-1:] == (hold,) else (*self._path, hold)
+        self._set_mode(now, hold)  # the phase last: an interrupt between finds the order
         self.phase, self.seen.patience = "holding", math.inf
         self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
-        self._set_mode(now, self._modes.hold)
 
     def _set_mode(self, now: float, mode: int) -> None:
         self._command(now, MavCommand.SET_MODE, *self._family.mode_parameters(mode))
@@ -405,8 +404,7 @@ class Watch(Machine[Ending]):
     def _command(self, now: float, command: MavCommand, *params: float) -> None:
         """Give an order, and repeat it until it is answered."""
         self._order = Order(command, params, now)
-        if self.phase != "disarming":
-            self.seen.said.clear()
+        self.seen.said.clear()
         self._repeat(now)
 
     def _repeat(self, now: float) -> None:
@@ -442,10 +440,12 @@ class Watch(Machine[Ending]):
 
     def _disarm(self, then: Ending, now: float) -> None:
         """Have it disarm, and end with `then`."""
-        self.phase, self._then = "disarming", then
-        self._path = self.seen.custom_mode, self._flown
+        self._then, self._path = then, (self.seen.custom_mode, self._flown)
+        # The order first: an interrupt between finds it, not the one to arm.
+        self._order = Order(MavCommand.ARM, (0.0,), now)
+        self.phase = "disarming"
         self.seen.told.append(f"{then.text}: it is asked to disarm")
-        self._command(now, MavCommand.ARM, 0.0)
+        self._repeat(now)
 
     def _leave_armed(self, why: str) -> None:
         """End, though it may still be armed."""

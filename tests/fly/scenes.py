@@ -334,8 +334,6 @@ def harmless(message: Message) -> bool:
 class AnotherStation(Machine[None]):
     """A ground station that says once a second, from a given time on, that it is there."""
 
-    progress = ("being there", 0, 0)
-
     def __init__(self, since: float = 0.0) -> None:
         super().__init__()
         self._since = since

@@ -27,6 +27,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
 from faao_mav.wire.messages import (
     CommandAck,
+    CommandLong,
     Envelope,
     GlobalPositionInt,
     Message,
@@ -61,6 +62,7 @@ PLANS: dict[str, Callable[[], Solution]] = {
     "swift": swift,
     "fenced": lambda: swift(fenced=True),
     "waiting": waiting,
+    "hovers": lambda: with_plan({"mission.on_finish": "hover"}),
     "away": lambda: with_plan({"site.origin.latitude": HOME.latitude + 0.001}),
 }
 PICKED: dict[str, Callable[[Message], bool]] = {
@@ -68,6 +70,11 @@ PICKED: dict[str, Callable[[Message], bool]] = {
     "disarm": lambda message: arms(message, 0.0),
     "start": starts,
     "setpoints": is_setpoint,
+    "hold": lambda message: (
+        isinstance(message, CommandLong)
+        and message.command == MavCommand.SET_MODE
+        and (message.param2, message.param3) in ((MODES["ardupilot"]["hold"], 0), (4, 3))
+    ),
     "land": lambda message: getattr(message, "param2", None) == MODES["ardupilot"]["land"],
 }
 

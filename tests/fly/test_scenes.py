@@ -4,7 +4,8 @@ A line of `tests/data/fly/scenes.txt` has three parts between bars. The first na
 
 - what is flown: `watch` (a mission that others start), `mission` (armed and started), `far` (one
   with a place 111 s away), `hovering` (one that ends in the air), or a plan by setpoints: `low`,
-  `swift`, `waiting`, `fenced` and `away` (from where the vehicle stands), on `both` kinds or one;
+  `hovers` (at its end), `swift`, `waiting`, `fenced` and `away` (from where the vehicle stands), on
+  `both` kinds or one;
 - parameters NAME=VALUE; options of the mock, `home=EAST,HIGHER` in metres; faults of the link, of
   which `loss` may have several values; `until`, s;
 - `refuses`: the start is denied; `stays-armed`: it does not disarm when it lands; `elsewhere`.
