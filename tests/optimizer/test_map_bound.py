@@ -65,10 +65,11 @@ def test_a_step_reaches_every_cell_that_v_max_does(small_plan: MakePlan) -> None
     assert largest_near(values, cells.rows).reshape(2, -1) == pytest.approx(best)
 
 
-def test_falling_prices_part_flights_that_never_meet(small_plan: MakePlan) -> None:
+@pytest.mark.parametrize("causal", [True, False])
+def test_several_prices_part_flights_that_never_meet(small_plan: MakePlan, causal: bool) -> None:
     """What one flight takes in near one station another cannot forward near the other."""
     faint = {"radio.base_station.power_dbm": -20, "radio.relay.power_dbm": -20}
-    changes = {"radio.causal": True, "radio.fading": "none", "radio.gain": {"exponent": 3}}
+    changes = {"radio.causal": causal, "radio.fading": "none", "radio.gain": {"exponent": 3}}
     problem = build_problem(small_plan(faint | changes))
     cells = MapBound.over(problem, best_rates(problem), 2000, 6.0)
     prices = np.linspace(0, 1, 21).tolist()

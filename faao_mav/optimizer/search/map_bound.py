@@ -5,14 +5,14 @@ For prices p_n from 0 to 1 of what the relay receives, which never rise,
     sum_n f_n <= sum_n p_n I_U(w_n) + (1 - p_n) I_G(w_n)
 
 is true of all that a queue delivers: a bit that leaves came in before it. Of R_avg it is true of
-one price. In half duplex a slot has the larger of the two terms. The best flight, by position
-alone, is a sweep over the `Cells` of a map, in which the price falls wherever and whenever that
-makes what is still to come worth less: so what one flight takes in, no other one can forward,
-unless both are at one place at one time. Whatever the prices, the sweep's value is above every
-flight.
+one price, which may differ by the place half-way. In half duplex a slot has the larger of the two
+terms. The best flight, by position alone, is a sweep over the `Cells` of a map, in which the price
+falls wherever and whenever that makes what is still to come worth less: so what one flight takes
+in, no other one can forward, unless both are at one place at one time. Whatever the prices, the
+sweep's value is above every flight.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,35 +87,46 @@ class MapBound:
     problem: Problem
     rates: BestRates
     cells: Cells
+    own: bool
+    """Whether every slot has rates of its own."""
 
     @classmethod
     def over(cls, problem: Problem, rates: BestRates, cells: int, reach: float) -> "MapBound":
         """Return the bound of `problem` over about so many cells, and steps of `reach` cells."""
         places = np.vstack([places_about(problem, link) for link in problem.links])
         kin, free = problem.kinematics, problem.free_area
-        return cls(problem, rates, cells_of(kin, places, cells, reach, free))
-
-    @property
-    def own(self) -> bool:
-        """Whether every slot has rates of its own."""
-        return own_rates(self.problem, self.rates)
+        found = cells_of(kin, places, cells, reach, free)
+        return cls(problem, rates, found, own_rates(problem, rates))
 
     def bound(self, prices: Sequence[float]) -> float:
-        """Return what no flight exceeds at the `prices` (B,), bit/s/Hz."""
-        p = np.unique(np.clip(prices, 0.0, 1.0))
-        queue, kin = self.problem.maximised_queue, self.problem.kinematics
+        """Return what no flight exceeds at the `prices` (B,), bit/s/Hz.
+
+        R_avg has one price for a whole flight, by the cell that it is in half-way.
+        """
+        p, blocks = np.unique(np.clip(prices, 0.0, 1.0)), self.cells.blocks
+        queue = self.problem.maximised_queue
         first, last = (at_ends(self.problem, self.rates, price) for price in (1.0, 0.0))
-        worth, count = np.zeros(1), 0
-        best = ((1 - p) * last)[:, None, None]
-        for k in reversed(range(len(self.cells.blocks))):
-            if self.own or len(self.cells.blocks[k]) != count:
-                worth, count = self._of_run(k, p), len(self.cells.blocks[k])
-            best = np.where(self.cells.alive[k], worth + best, -np.inf)
-            if queue is not None:
-                best = np.minimum.accumulate(best, axis=0)
-            if k:
+        of_length = {len(block): k for k, block in enumerate(blocks)}
+        shared = {} if self.own else {n: self._of_run(k, p) for n, k in of_length.items()}
+
+        def worth(k: int) -> Real:
+            found = shared[len(blocks[k])] if shared else self._of_run(k, p)
+            return np.where(self.cells.alive[k], found, -np.inf)
+
+        def swept(runs: Iterable[int], end: Real) -> Real:
+            best = end[:, None, None]
+            for k in runs:
+                best = worth(k) + best
+                if queue is not None:
+                    best = np.minimum.accumulate(best, axis=0)
                 best = largest_near(best, self.cells.rows)
-        return float((best.max(axis=(1, 2)) + p * first).min()) / kin.slots
+            return best
+
+        runs = range(len(blocks))
+        middle = len(blocks) // 2 if queue is None else 0
+        before, after = swept(runs[:middle], p * first), swept(runs[:middle:-1], (1 - p) * last)
+        through = (before + worth(middle) + after).min(axis=0)
+        return float(through.max()) / self.problem.kinematics.slots
 
     def _of_run(self, k: int, p: Real) -> Real:
         """Return what run `k` of slots is worth in each cell at prices `p` (B,), (B, i, j), bits.
@@ -153,10 +164,10 @@ class MapBound:
         return best
 
     def _table(self, level: int, slot: int, axes: Sequence[Real], p: Real) -> Real:
-        """Return the most rates of both links about the points of `axes` (2, i, j), bits.
+        """Return the most rates (2, i, j) of both links about the points of `axes`, bits.
 
         About them is within `level` times `_NEARER` sides of a cell. In half duplex it is what the
-        `slot` is worth at the prices `p` (B,): (B, i, j).
+        `slot` is worth at the prices `p` (B,), (B, i, j).
         """
         off = level * _NEARER * self.cells.side
         U, G = (
@@ -246,8 +257,8 @@ def map_bound(problem: Problem, rates: BestRates, *, cells: int | None = None) -
     is tighter; it takes as many times longer.
     """
     if cells is None:
-        cells = _MAPPED_CELLS if problem.mapped else _CELLS
-        cells = _OWN_CELLS if own_rates(problem, rates) else cells
+        own = own_rates(problem, rates)
+        cells = _OWN_CELLS if own else _MAPPED_CELLS if problem.mapped else _CELLS
     price = best_price(MapBound.over(problem, rates, _COARSE_CELLS, _COARSE_REACH).bound)
     prices = [*(price - _APART), price, *(price + _APART)]
     return MapBound.over(problem, rates, cells, _REACH).bound(prices)

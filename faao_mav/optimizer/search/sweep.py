@@ -32,8 +32,8 @@ class Cells:
     `x` (2, i, j) are the centres of the cells, m, `side` theirs; `blocks` the K runs of slots
     between the first and the last, which are at given places, and `instants` (K,) their mean times,
     s. `alive` (K, i, j) tells where a flight can be at an instant. `rows` is what a step from one
-    instant to the next reaches: by how many rows to either side, and how many columns there. It may
-    pass through an obstacle that is thinner.
+    instant to the next reaches: by how many rows to either side, and how many columns there. A step
+    may pass through an obstacle that is thinner than it is long.
     """
 
     x: Real
