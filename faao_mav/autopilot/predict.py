@@ -17,7 +17,7 @@ from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.autopilot.vehicle import Vehicle
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import FLOWN_TO, Command
+from faao_mav.mission.command import FLOWN_TO, HOLDING, Command
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
 from faao_mav.vector import Vector
 
@@ -31,14 +31,6 @@ work at most, whatever a file or a peer asks for."""
 
 _REPEATS = 20  # How often a jump that never ends is followed. Chosen.
 _SAME_PLACE = 0.01  # The distance, m, below which two places are one.
-
-_HOLDING = (
-    Command.NAV_WAYPOINT,
-    Command.NAV_SPLINE_WAYPOINT,
-    Command.NAV_LOITER_TIME,
-    Command.NAV_DELAY,
-)
-"""Commands whose param1 is how long, s, what hovers waits."""
 
 _SHORTEST = 1e-3  # The shortest motion, s, that is worth a sample.
 
@@ -151,7 +143,7 @@ class _Walk:
                 self._land(index, item)
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
-            case Command.NAV_DELAY if self._type.hovers and math.isfinite(item.params[0]):
+            case Command.NAV_DELAY if self._type.hovers:
                 self._towards(index, self._last)
             case Command.DO_CHANGE_SPEED:
                 self._change_speed(item)
@@ -171,7 +163,7 @@ class _Walk:
         """Go on to `goal` (3,), m, as the item says."""
         item, here, hold = self._mission.items[index], self._last, 0.0
         command, wait, radius = item.command, item.params[0], item.params[1]
-        if self._type.hovers and command in _HOLDING and 0 < wait < math.inf:
+        if self._type.hovers and command in (*HOLDING, Command.NAV_DELAY) and 0 < wait < math.inf:
             whole = self._type.whole_second_holds and command != Command.NAV_DELAY
             hold = math.floor(wait) if whole else wait
         if np.abs(goal - here).max() <= _SAME_PLACE:
@@ -252,10 +244,16 @@ class _Walk:
         lasting = orbit.lasting(self._speed, abs(rise) / rate)
         if lasting >= _SHORTEST:
             t = self._times(lasting)
-            turned = orbit.speed(self._speed) / orbit.radius * t  # angles count from east to north
-            out = complex(*(edge - center[:2])) * np.exp((-1j if orbit.clockwise else 1j) * turned)
+            # angles count from east to north
+            turning = (-1j if orbit.clockwise else 1j) * orbit.speed(self._speed) / orbit.radius
+            out = complex(*(edge - center[:2])) * np.exp(turning * t)
+            along, climbs = turning * out, t < abs(rise) / rate
+            if self._type.hovers:
+                along[[0, -1]] = 0.0
             up = self._place[2] + np.sign(rise) * np.minimum(rate * t, abs(rise))
-            self._show(index, t, np.stack([center[0] + out.real, center[1] + out.imag, up], axis=1))
+            position = np.stack([center[0] + out.real, center[1] + out.imag, up], axis=1)
+            climbing = np.where(climbs, np.sign(rise) * rate, 0.0)
+            self._show(index, t, position, np.stack([along.real, along.imag, climbing], axis=1))
         self._reached[index] = self._clock
         self.over = self.over or orbit.endless
 
@@ -293,18 +291,18 @@ class _Walk:
         """Move to `goal` at constant speed in `lasting` seconds."""
         if lasting >= _SHORTEST:
             t = self._times(lasting)
-            self._show(index, t, self._place + (t / lasting)[:, None] * (goal - self._place))
+            velocity = np.tile((goal - self._place) / lasting, (len(t), 1))
+            position = self._place + t[:, None] * velocity
+            velocity[[0, -1]] = 0.0
+            self._show(index, t, position, velocity)
 
     def _times(self, lasting: float) -> Real:
         """Return when to take samples of what goes on for `lasting` seconds, s."""
         self._check_clock(lasting)
-        return np.linspace(0.0, lasting, max(3, math.ceil(lasting / self._step) + 1))
+        return np.linspace(0.0, lasting, max(2, math.ceil(lasting / self._step) + 1))
 
-    def _show(self, index: int, t: Real, position: Real) -> None:
-        """Be at `position` (n, 3), m, after `t` (n,) seconds from now."""
-        velocity = np.gradient(position, t, axis=0, edge_order=2)
-        if self._type.hovers:
-            velocity[[0, -1]] = 0.0
+    def _show(self, index: int, t: Real, position: Real, velocity: Real) -> None:
+        """Be at `position` with `velocity` (n, 3), m and m/s, after `t` (n,) seconds from now."""
         self._add(t, position, velocity, np.full(len(t), index))
         self._clock, self._place = self._clock + float(t[-1]), position[-1]
 

@@ -1,6 +1,6 @@
 """A vehicle: its type and the parameters that it is given; and the types that are known.
 
-Another vehicle is one folder with one `VehicleType` and one call of `register`.
+Another vehicle is one module or folder with one `VehicleType` and one call of `register`.
 """
 
 import math
@@ -31,7 +31,8 @@ limit. Measured, in ArduCopter's simulator: see docs/benchmarks.md."""
 
 
 LANDING_HEIGHT = 10.0
-"""The height above the ground, m, from which a landing goes on at the landing speed."""
+"""The height above the ground, m, from which a landing goes on at the landing speed.
+Chosen: ArduCopter's own by default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +144,13 @@ class Vehicle:
     def landing_time(self, height: float) -> float:
         """Return how long the way down to the ground takes from a `height`, m, s."""
         slow = min(max(height, 0.0), LANDING_HEIGHT)
-        landing = slow / self.value("landing_speed", 0.5)
+        landing = slow / self.landing_speed
         return landing + self._ramped(height - slow, self.value("descent_speed"))
+
+    @property
+    def landing_speed(self) -> float:
+        """The speed of the last `LANDING_HEIGHT` metres, m/s; a plane has no parameter for it."""
+        return self.value("landing_speed", 0.5)
 
     def _ramped(self, height: float, speed: float) -> float:
         """Return how long it takes to climb or sink by `height`, m, at `speed`, m/s."""

@@ -41,6 +41,9 @@ FLOWN_TO = frozenset(command for command in Command if command.name.startswith("
 }
 """Commands that fly to the place x, y, z of their item."""
 
+HOLDING = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
+"""Commands to a place whose param1 is how long, s, what hovers waits there."""
+
 LANDINGS = frozenset({Command.NAV_LAND, Command.NAV_VTOL_LAND})
 TAKEOFFS = frozenset({Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF})
 

@@ -112,7 +112,7 @@ class Flight:
         if action != "return" or self._type.hovers:
             low = up if action == "sink" else min(up, LANDING_HEIGHT)
             legs.append((np.array([east, north, low]), vehicle.value("descent_speed")))
-            legs.append((np.array([east, north, 0.0]), vehicle.value("landing_speed", 0.5)))
+            legs.append((np.array([east, north, 0.0]), vehicle.landing_speed))
         self.aircraft.go(now, *legs)
 
     # ---- the mission and the fence

@@ -54,9 +54,8 @@ def _arming(context: ValidationContext) -> Hits:
     off = ", and TERRAIN_ENABLE is 0" if context.value("terrain_enable") == 0 else ""
     if above:
         yield hit("ardupilot-terrain", above[0], count=len(above), off=off)
-    for k, _ in context.each(Command.DO_LAND_START):
-        if context.value("return_lands") == 0:
-            yield hit("ardupilot-land-start", k)
+    if context.value("return_lands") == 0:
+        yield from (hit("ardupilot-land-start", k) for k, _ in context.each(Command.DO_LAND_START))
     if not bits & RALLY_BIT or context.frame is None:
         return
     limit = context.value("rally_limit")
@@ -71,8 +70,8 @@ def _arming(context: ValidationContext) -> Hits:
 @checks
 def _takeoff(context: ValidationContext) -> Hits:
     """How the mission begins, and home that is moved after that."""
-    takeoffs = [k for k, _ in context.each(*_TAKEOFFS[context.vehicle.kind])]
-    does, before = _ON_GROUND[context.vehicle.kind], 0
+    takeoffs = [k for k, _ in context.each(*_TAKEOFFS.get(context.vehicle.kind, ()))]
+    does, before = _ON_GROUND.get(context.vehicle.kind, ""), 0
     if context.items and not takeoffs:
         air = context.airborne
         yield hit("ardupilot-begins-in-the-air" if air else "ardupilot-no-takeoff", does=does)
@@ -109,7 +108,7 @@ def _items(context: ValidationContext) -> Hits:
             yield hit("ardupilot-stays", k)
         if item.command in FLOWN_TO and item.frame == Frame.MISSION:
             yield hit("ardupilot-frame-mission", k)
-        if item.command in _SKIPPED[context.vehicle.kind]:
+        if item.command in _SKIPPED.get(context.vehicle.kind, ()):
             yield hit("ardupilot-command-skipped", k)
     pairs = [(k, item.z, kept.z) for k, item, kept in context.stored if item.command in FLOWN_TO]
     changed = [(k, kept) for k, up, kept in pairs if abs(kept - up) > 1e-4 * max(1.0, abs(up))]

@@ -146,8 +146,8 @@ class ValidationContext:
         return self.value(key), self.vehicle.name_of(key) if known else ""
 
     def value(self, key: str, otherwise: float = math.nan) -> float:
-        """Return the value of `parameter`, `otherwise` for a vehicle that has none."""
-        return self.vehicle.value(key) if key in self.vehicle.type.parameters else otherwise
+        """Return the value of the parameter `key`, `otherwise` for a vehicle that has none."""
+        return self.vehicle.value(key, otherwise)
 
     @cached_property
     def changes(self) -> tuple[SpeedChange | None, ...]:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from faao_mav.mission.command import ABOVE_HOME, LANDINGS, TAKEOFFS, Command
+from faao_mav.mission.command import ABOVE_HOME, HOLDING, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import HOME, PlacedItem, ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
@@ -32,16 +32,14 @@ _FARTHEST = {True: 100.0, False: 1_000.0}
 """Kilometres from home that no copter, and no plane, flies to. Chosen: twice what they do in the
 hours that flights are predicted."""
 
-_HOLDS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
-_DELAYS = (*_HOLDS, Command.NAV_DELAY)
-
 
 @checks
 def _beyond(context: ValidationContext) -> Hits:
     """Places beyond the limits that were given, those of the vehicle's own fence, and any sense."""
     value, limits, high = context.value, context.limits, context.vehicle.fence_heights[1]
-    kinds = int(value("fence_type", 0)) if value("fence_enable") > 0 else 0
+    kinds = int(value("fence_type", 0)) if value("fence_enable", 0.0) != 0 else 0
     radius = value("fence_radius") if kinds & 2 else math.inf
+    farthest = value("fence_distance") if value("fence_distance") > 0 else math.inf
     for place in context.places:
         away = place.from_origin if context.home is not None else 0.0
         for rule, reached, limit in (
@@ -51,7 +49,7 @@ def _beyond(context: ValidationContext) -> Hits:
             ("ardupilot-fence-ceiling", place.up, high),
             ("ardupilot-fence-circle", away, radius),
             ("px4-max-vertical", place.up, high),
-            ("px4-max-horizontal", away, value("fence_distance") or math.inf),
+            ("px4-max-horizontal", away, farthest),
         ):
             if reached > limit:
                 yield hit(rule, place.index, place=place, limit=limit)
@@ -151,7 +149,11 @@ def _least_duration(context: ValidationContext) -> float:
     for leg in (leg for leg in context.legs if not leg.jump):
         up = leg.rise / climb if leg.rise > 0 and climb > 0 else 0.0
         flying += max(leg.length / leg.speed if leg.speed > 0 else 0.0, up)
-    holds = (item.params[0] for k, item in context.each(*_DELAYS) if k not in context.orbits)
+    holds = (
+        item.params[0]
+        for k, item in context.each(*HOLDING, Command.NAV_DELAY)
+        if k not in context.orbits
+    )
     waiting = sum(hold for hold in holds if hold > 0)
     orbits = ((k, orbit) for k, orbit in context.orbits.items() if not orbit.endless)
     circling = sum(orbit.lasting(context.speeds[k]) for k, orbit in orbits)

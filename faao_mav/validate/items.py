@@ -6,6 +6,7 @@ from faao_mav.mission.command import (
     ABOVE_HOME,
     ABOVE_SEA,
     FLOWN_TO,
+    HOLDING,
     LANDINGS,
     TAKEOFFS,
     Command,
@@ -126,7 +127,6 @@ def _replacement(item: MissionItem) -> str:
     return "remove the item, or use a command that the autopilot has"
 
 
-_HELD = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT, Command.NAV_LOITER_TIME)
 _RADIUS, _YAW = 1, 3
 _MEANING = {_RADIUS: " (acceptance radius)", 2: " (pass-by radius)", _YAW: " (yaw)"}
 """What the parameters of a waypoint mean, counted from 0."""
@@ -148,7 +148,7 @@ def _stored(context: ValidationContext) -> Hits:
             turned = n == _YAW and _same(value % 360, kept)
             if _same(value, kept) or turned or of not in FLOWN_TO:
                 continue
-            if n == 0 and of in _HELD:
+            if n == 0 and of in HOLDING:
                 instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
                 if waypoint and not hovers:
                     instead = "use NAV_LOITER_TIME: a plane waits in a circle"

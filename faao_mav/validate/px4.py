@@ -103,8 +103,11 @@ def _takeoff(context: ValidationContext) -> Hits:
         1: ("a take-off", takeoff),
         2: ("a landing", landing),
         3: ("a take-off and a landing", takeoff and landing),
-    }.get(required, ("both a take-off and a landing, or neither", takeoff == landing))
-    if not there:  # 5 asks for both on the ground, in the air for what 2 does
+        4: ("both a take-off and a landing, or neither", takeoff == landing),
+        # 5 asks for both on the ground, in the air for what 2 does
+        5: ("both a take-off and a landing, or neither", takeoff == landing),
+    }.get(required, ("nothing", True))
+    if not there:
         missing = Command.NAV_LAND if takeoff else Command.NAV_TAKEOFF
         rule = "px4-takeoff-or-landing-missing"
         yield hit(rule, required=required, what=what, missing=missing.name)

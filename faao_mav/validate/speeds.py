@@ -148,8 +148,8 @@ def _slow(context: ValidationContext) -> Hits:
 
 
 def _reached_speeds(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
-    """Yield the legs between waypoints, and the predicted flight's greatest speed on each, m/s."""
-    if context.track is None:
+    """Yield a copter's legs between waypoints, and its greatest predicted speed on each, m/s."""
+    if context.track is None or not context.vehicle.type.hovers:
         return
     waypoints = {k for k, _ in context.each(Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)}
     fastest = np.full(len(context.items), -np.inf)
@@ -211,8 +211,9 @@ def _turns(context: ValidationContext) -> Hits:
             told = {"turn": math.degrees(turn), "bank": math.degrees(bank), "needed": needed}
             yield hit("turn-too-tight", before.index, leg=before, room=room, **told)
     if sharp and context.vehicle.type.hovers:
-        (turn, _, leg), slow = max(sharp), ""
-        passing = context.vehicle.flight_model().corner_speed(turn)
+        (turn, _, leg), slow, passing = max(sharp), "", None
+        if context.vehicle.type.flight_model is not None:
+            passing = context.vehicle.flight_model().corner_speed(turn)
         if passing is not None:
             slow = f", passed at about {passing:.1f} m/s"
         count, turn = counted(len(sharp), "corner"), math.degrees(turn)

@@ -1,4 +1,4 @@
-"""ArduPilot: what ArduCopter and ArduPlane share, and their dialects."""
+"""ArduPilot: what its copters and planes share; and their dialects, of items kept in 15 bytes."""
 
 import math
 from collections.abc import Callable, Mapping

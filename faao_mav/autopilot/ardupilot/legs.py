@@ -1,4 +1,6 @@
-"""How ArduCopter's target moves along straight legs: ramps, cruises, overlaps at corners.
+"""What bounds a flight of ArduCopter, and how its target moves along straight legs.
+
+It goes in ramps and cruises, which overlap at corners.
 
 A ramp changes the speed by d within the acceleration A and the jerk J, which takes t_j s to rise.
 Its acceleration grows for r s, stays at a, and falls as it grew; in all it takes D s:
@@ -38,7 +40,6 @@ FASTEST = 40.0  # The speed, m/s, that no leg comes to. Chosen above all that is
 _HALVINGS = 9
 """How often an interval is halved that holds what is sought, before it lies on a line between both
 ends. Chosen: of 40 m/s 0.08 are left."""
-
 
 _LEAST_INPUT_TIME = 0.1  # The autopilot's own lower bound of ATC_INPUT_TC, s.
 

@@ -162,7 +162,7 @@ _SHARED = (
     rule("return_height", 60.0, "RTL_RETURN_ALT", "m", 0.0),
     rule("return_type", 0, "RTL_TYPE"),
 )
-"""Mission checks, fence and return."""
+"""Mission checks, fence and return; as below by the parameter reference of PX4 1.16."""
 
 
 _COPTER_TABLE = table(

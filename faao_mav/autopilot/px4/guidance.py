@@ -118,7 +118,7 @@ def legs(limits: Px4Limits, path: FlightPath) -> list[GuidedLeg]:
     passable = (following > 1e-3) & (following >= radii) & ~holding
     climbs_on = (rises[:-1] * rises[1:] > 0) & ~holding
     climbs = np.where(rises[:-1] > 0, limits.climb_speed, limits.descent_speed)
-    ways = moves / np.maximum(np.abs(moves), TINY)
+    ways = np.array([unit(move) for move in moves.tolist()])
     where = places[:-1], places[1:], heights[1:], ways[:-1], ways[1:]
     exits = np.minimum(ahead, speeds) * passable, climbs * climbs_on
     how = speeds, radii, np.maximum(path.holds[1:], 0.0), *exits

@@ -14,7 +14,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, Frame
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Command, Frame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import areas_of
 from faao_mav.mission.formats.mission_file import left_out
@@ -65,10 +65,17 @@ def write_kml(mission: Mission, name: str = "mission") -> str:
     return "\n".join((_HEAD, _tag("Document", "\n".join(parts)), "</kml>", ""))
 
 
-def kml_losses(mission: Mission, _: object = None) -> Iterator[str]:
+def kml_losses(mission: Mission, _: object) -> Iterator[str]:
     """Yield what of `mission` a KML file does not hold or show."""
     yield from left_out(mission, "KML")
     yield "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back"
+    frames = {item.frame for item in mission.items}
+    if _ground(mission) is None and frames & ABOVE_HOME:
+        yield "no height of home is known: heights above home are drawn above the ground"
+    if frames & ABOVE_TERRAIN:
+        yield "heights above terrain are drawn above Google Earth's own"
+    if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
+        yield "spline waypoints are joined by straight lines"
 
 
 def _waypoints(mission: Mission) -> Iterator[tuple[int, MissionItem, Spot]]:

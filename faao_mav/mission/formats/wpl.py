@@ -62,7 +62,7 @@ def write_wpl(mission: Mission) -> str:
     return _text(mission.home, mission.items)
 
 
-def wpl_losses(mission: Mission, _: object = None) -> Iterator[str]:
+def wpl_losses(mission: Mission, _: object) -> Iterator[str]:
     """Yield what of `mission` the files do not hold."""
     yield from left_out(mission, "QGC WPL")
     yield from zeros(mission, for_nan=True)
