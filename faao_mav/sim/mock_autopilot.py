@@ -24,15 +24,18 @@ from faao_mav.wire.wire_items import home_items, mission_of
 _ACCEPTED, _DENIED, _UNSUPPORTED, _FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
 
-_SET_MODE, _CUSTOM_MODE, _AUTO = 11, 1, 4 | 8 | 16
-"""The number of SET_MODE; and MAV_MODE_FLAG: a custom mode is set; automatic, guided and
-stabilised."""
+_SET_MODE = 11  # The number of SET_MODE.
+
+_CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
+"""MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
 
 _LATE = 0.05
 """Seconds by which `tick` is overdue that make a sped up flight stand still; chosen."""
 
-_CAPABILITIES, _VERSION = 1 | 4 | 8 | 8192 | 16_384 | 32_768, 0x04_06_00_FF
-"""MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE, MISSION_RALLY; a release."""
+_CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
+"""MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE and MISSION_RALLY."""
+
+_VERSION = 0x04_06_00_FF  # That of a release, 4.6.0.
 
 
 class MockAutopilot(Machine[None]):
@@ -50,8 +53,6 @@ class MockAutopilot(Machine[None]):
     that is given. It tells that its battery is at `battery` percent, -1: not known. It flies in
     a `wind`, m/s east and north.
     """
-
-    progress = ("flying", 0, 0)
 
     def __init__(
         self,

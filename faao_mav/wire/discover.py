@@ -26,10 +26,11 @@ from faao_mav.wire.transport import Origin
 _MAIN = 1
 """MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
 
-_BOOT, _SETTLE, _GREET, _KNOCK = 60.0, 1.2, 1.0, 2.0
-"""Seconds that a vehicle may boot; after the first vehicle in which others are heard; between two
-questions to whoever is there; and of silence before a heartbeat is sent into it. Chosen: vehicles
-send a heartbeat each second."""
+_BOOT = 60.0  # Seconds that a vehicle may boot. Chosen.
+
+_SETTLE, _GREET, _KNOCK = 1.2, 1.0, 2.0
+"""Seconds after the first vehicle in which others are heard; between two questions to whoever is
+there; and of silence before a heartbeat is sent into it. Chosen: vehicles send one each second."""
 
 _NOTHING = "is it switched on and connected there, and no other program in between?"
 

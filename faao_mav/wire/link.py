@@ -33,9 +33,8 @@ _BEAT = 1.0
 """Seconds between two heartbeats, what the MAVLink guide asks for, and between two looks at how
 far a machine is."""
 
-_SHOWN, _SETUP_SIGNING = 3, 256
-"""Other origins of the vehicle's packets that are told, at most: chosen; the number of the message
-SETUP_SIGNING."""
+_SHOWN = 3  # Other origins of the vehicle's packets that are told, at most. Chosen.
+_SETUP_SIGNING = 256  # The number of the message SETUP_SIGNING.
 
 
 class Tlog:

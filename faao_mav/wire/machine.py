@@ -31,11 +31,6 @@ class Machine(ABC, Generic[T]):
         """When `tick` is due."""
         return None if self.outcome is not None else self._due
 
-    @property
-    @abstractmethod
-    def progress(self) -> Progress:
-        """What is going on."""
-
     @abstractmethod
     def start(self, now: float) -> Sequence[Message]:
         """Begin."""

@@ -24,11 +24,12 @@ Names: TypeAlias = tuple[str, ...]
 _INT32 = 6
 """MAV_PARAM_TYPE of whole numbers of 32 bits."""
 
-_AT_ONCE, _SILENCE = 10, 4.0
-"""Names that are asked for at once, half of the queue that ArduPilot has for them; and seconds
-without a new answer after which no more are asked for: of 50 parameters, over a link that loses a
-fifth each way, one stays unread in 1.4 % of all readings; a name that the vehicle does not know
-costs these seconds. Chosen."""
+_AT_ONCE = 10  # Names that are asked for at once: half of ArduPilot's queue for them. Chosen.
+
+_SILENCE = 4.0
+"""Seconds without a new answer after which no more are asked for, or set. Chosen: of 50 parameters
+that are read, over a link that loses a fifth each way, one stays unread in 1.4 % of all readings; a
+name that the vehicle does not know costs these seconds."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ from faao_mav.wire.protocol import Address
 Verdict: TypeAlias = Literal["signed", "unsigned", "forged", "old"]
 """What is to be said of a packet where packets are to be signed; "forged" is of another key."""
 
-_KEY_BYTES, _LARGEST_FILE = 32, 1024
-"""Bytes of a key, and of a key file that are read, at most: above 64 digits and some blanks."""
+_KEY_BYTES = 32
+_LARGEST_FILE = 1024  # Bytes of a key file that are read, at most: above 64 digits and some blanks.
 
 _EPOCH, _TICKS, _LAST_TICK = 1_420_070_400, 100_000, 2**48 - 1
 """Seconds from 1970 to the start of 2015, ticks in a second, and the last one."""

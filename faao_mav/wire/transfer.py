@@ -39,9 +39,8 @@ nothing else is said."""
 _OPENING = -1
 """The question that opens a transfer, where the others are the numbers of items."""
 
-_TEXTS, _REASONS = 5, 1.5
-"""How many status texts are kept, the last ones, and seconds to wait after a refusal for the one
-that gives the reason; chosen."""
+_TEXTS = 5  # The number of status texts that are kept, the last ones. Chosen.
+_REASONS = 1.5  # Seconds to wait after a refusal for the text that gives the reason. Chosen.
 
 _LATE = 0.4
 """By how many seconds packets are taken to be late, once one has ended a transfer: chosen, above

@@ -8,6 +8,7 @@ import contextlib
 import errno
 import select
 import socket
+import time
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -19,13 +20,19 @@ FORMS = (
     "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
 )
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
-_CONNECT_TIMEOUT, _WRITE_TIMEOUT = 5.0, 5.0
-"""Seconds to wait for a TCP connection, and in which a serial port has to take a packet: chosen,
-above the 4.3 s in which a line of 9600 baud empties the 4096 bytes that Linux keeps for it."""
+_CONNECT_TIMEOUT = 5.0  # Seconds to wait for a TCP connection. Chosen.
 
-_MOST_PEERS, _BURST = 64, 256
-"""The most UDP senders that are remembered, and TCP peers: each is sent every packet; and datagrams
-that are read at once: who sends without end stops nothing else. Chosen."""
+_WRITE_TIMEOUT = 5.0
+"""Seconds in which a serial port has to take a packet: chosen, above the 4.3 s in which a line of
+9600 baud empties the 4096 bytes that Linux keeps for it."""
+
+_FORGET = 30.0
+"""Seconds after which a silent UDP sender is not answered any more: chosen, 30 lost heartbeats."""
+
+_MOST_PEERS = (
+    64  # UDP senders that are remembered, and TCP peers, at most. Chosen: each is sent all.
+)
+_BURST = 256  # Datagrams read at once: who sends without end stops nothing else. Chosen.
 
 _REASONS = {
     errno.EADDRINUSE: "the port is in use; stop who listens there, or take another port",
@@ -50,7 +57,7 @@ class Transport(Protocol):
         """Return the packets that arrive within `timeout` seconds, as soon as something does."""
 
     def write(self, data: bytes, to: Origin | None = None, /) -> None:
-        """Send one packet to `to`, or to everybody who was heard."""
+        """Send one packet to `to`, or to everybody who was heard of late."""
 
     def close(self) -> None:
         """Let go of the connection."""
@@ -127,8 +134,8 @@ class _Udp:
     def __init__(self, address: _Place, *, listens: bool) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._target, self.listens = None if listens else address, listens
-        self._senders: dict[_Place, Framer] = {}
-        """What cuts up what each sends; who is silent longest comes first."""
+        self._senders: dict[_Place, tuple[float, Framer]] = {}
+        """When each was heard last, s, and what cuts it up; who is silent longest comes first."""
         self._socket.setblocking(False)
         if listens:
             try:
@@ -150,7 +157,8 @@ class _Udp:
         return found
 
     def write(self, data: bytes, to: Origin | None = None) -> None:
-        targets = list(self._senders)
+        recent = time.monotonic() - _FORGET
+        targets = [place for place, (heard, _) in self._senders.items() if heard > recent]
         if self._target is not None:
             targets = [self._target]
         elif to is not None:
@@ -166,10 +174,10 @@ class _Udp:
 
     def _framer(self, address: _Place) -> Framer:
         """Return what cuts up what comes from `address`; too many forget who is silent longest."""
-        framer = self._senders.pop(address, None) or Framer()
+        _, framer = self._senders.pop(address, (0.0, Framer()))
         if len(self._senders) == _MOST_PEERS:
             del self._senders[next(iter(self._senders))]
-        self._senders[address] = framer
+        self._senders[address] = time.monotonic(), framer
         return framer
 
 

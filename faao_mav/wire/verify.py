@@ -13,9 +13,8 @@ from faao_mav.wire.wire_items import coordinate_scale, home_items, mission_item
 
 DifferenceKind: TypeAlias = Literal["dropped", "wrong"]
 
-_CENTIMETRE, _FLOAT32 = 0.0101, 2e-7
-"""Altitudes that differ by less are equal, m: ArduPilot stores whole centimetres; and the relative
-difference of two numbers that single precision does not tell apart."""
+_CENTIMETRE = 0.0101  # Altitudes that differ by less are equal, m: ArduPilot stores centimetres.
+_FLOAT32 = 2e-7  # The relative difference that single precision does not tell.
 
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
 """Frames with the same meaning: those ending in _INT, and what they are called without."""

@@ -57,11 +57,11 @@ def converse(machine: Machine[Any], codec: Codec, heard: Iterator[bytes], now: f
     begun = now
     packed(codec, machine.start(now))
     while machine.outcome is None:
-        assert now - begun < 3600, f"no end: {machine.progress}"
+        assert now - begun < 3600, f"no end: {machine}"
         datagram = next(heard, None)
         now += _STEP
         if datagram is None:
-            assert machine.deadline is not None, f"waits for ever: {machine.progress}"
+            assert machine.deadline is not None, f"waits for ever: {machine}"
             now = max(now, machine.deadline)
         else:
             answer(machine, codec, datagram, now)
