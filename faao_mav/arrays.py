@@ -12,6 +12,10 @@ Flags: TypeAlias = NDArray[np.bool_]
 RealOrComplex: TypeAlias = Real | Complex
 
 
+PACKED = np.array([[0, 1], [1, 2]])
+"""Which of the entries xx, xy, yy stand where in the matrix."""
+
+
 def products(a: Real, b: Real) -> Real:
     """Return the symmetric part of a b^T as its entries xx, xy, yy (3, ...), for a, b (2, ...)."""
     return np.stack([a[0] * b[0], (a[0] * b[1] + a[1] * b[0]) / 2, a[1] * b[1]])

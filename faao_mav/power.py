@@ -217,7 +217,7 @@ class FixedWing:
 
 
 PowerModel: TypeAlias = RotaryWing | FixedWing
-"""What a flight takes, W."""
+"""What tells the power, W, that a flight takes: of a rotary wing or of a fixed one."""
 
 
 def _least(speeds: Real, powers: Real) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from faao_mav.errors import FaaoError
 
 T = TypeVar("T")
 
-_PRELOADED = ("faao_mav.app.answers", "faao_mav.report", "scipy.interpolate", "shapely", "pyproj")
+_PRELOADED = ("faao_mav.app.answers", "scipy.interpolate", "shapely", "pyproj")
 """What a job would else import again: modules that `plan_mission` and the report page use."""
 
 _NICE = 10

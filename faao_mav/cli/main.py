@@ -59,8 +59,8 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-COMMANDS = (plan, validate, upload, download, fly, debrief, link, convert, autopilot, study, page)
-for command in COMMANDS:
+_COMMANDS = (plan, validate, upload, download, fly, debrief, link, convert, autopilot, study, page)
+for command in _COMMANDS:
     app.command(command.__name__)(cli.exit_status()(command))
 
 

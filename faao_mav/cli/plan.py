@@ -50,6 +50,7 @@ def plan(
     input.
     """
     from faao_mav.report import summary
+    from faao_mav.report.page import write_part
     from faao_mav.workflow import plan_mission
 
     if upload is None and (system is not None or allow_armed):
@@ -65,8 +66,6 @@ def plan(
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
             if path is not None:
-                from faao_mav.report.page import write_part
-
                 write_part(result, name.removeprefix("--"), path)
         mission = result.write(out) if out is not None else ()
     written = [*mission, *filter(None, files.values())]

@@ -266,13 +266,13 @@ def _main(path: Path, system: int) -> None:
     try:
         # The libraries' own remarks go nowhere: they are a line for each byte of zeros.
         with Path(os.devnull).open("w") as out, redirect_stdout(out), redirect_stderr(out):
-            found = flights(path, messages(path), system)
+            found = json.dumps(flights(path, messages(path), system))
     except InputError as error:
         sys.exit(str(error))
     except Exception as error:  # what libraries make of files that are something else
         reason = shortened(f"{type(error).__name__}: {error}")
         sys.exit(f"{path}: not a {path.suffix} log: {reason}")
-    json.dump(found, sys.stdout)
+    sys.stdout.write(found)
 
 
 if __name__ == "__main__":

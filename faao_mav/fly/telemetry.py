@@ -158,16 +158,17 @@ class Telemetry:
     Without `rows` its mission is not looked at. It is asked for `rate` positions a second. After
     `patience` seconds without any message, `PATIENCE` at first, nothing more can be known.
 
-    `told` is what has happened and `said` what the vehicle said that is a warning or worse, in
-    words, `fixes` where it was; `heartbeat`, `current`, `status` and `position` are the last of
-    these messages, None before the first, `wanted` the last CURRENT_MODE, None where the last
-    heartbeat tells another mode. `knows_place`: LOCAL_POSITION_NED was heard, which ArduPilot sends
-    once its estimator knows where it is. `place` is where it is by `position`, m above the sea,
-    None where it does not tell. `stations` are other ground stations that were heard, `strangers`
-    addresses on the network from which something else speaks in its name. `ending` is why nothing
-    more can be known, None as long as something can. `begun` is when it began to listen, `heard_at`
-    when it last heard the vehicle, after a `silence`, and `disarmed_at` when that was armed no
-    more, infinite as long as it is or never was, all in s.
+    `told` is what has happened and `said` what the vehicle said since the last order, a warning or
+    worse, in words, `fixes` where it was; `heartbeat`, `current`, `status` and `position` are the
+    last of these messages, None before the first, `wanted` the last CURRENT_MODE, None where the
+    last heartbeat tells another mode. `knows_place`: LOCAL_POSITION_NED was heard, which ArduPilot
+    sends once its estimator knows where it is. `place` is where it is by `position`, m above the
+    sea, None where it does not tell. `stations` are other ground stations that were heard,
+    `strangers` addresses on the network from which something else speaks in its name. `ending` is
+    why nothing more can be known, None as long as something can. `begun` is when it began to
+    listen, `heard_at` when it last heard the vehicle, after a `silence`, and `disarmed_at` when
+    that was armed no more, infinite as long as it is or never was, and once a watch has taken note,
+    all in s.
     """
 
     def __init__(self, peer: Peer, rows: Sequence[WireItem], rate: float = POSITION_RATE) -> None:

@@ -239,8 +239,8 @@ def convex_bound(
     c *= shrink(c)
     q = cp.Variable((len(w_i), 1))
     unit = LENGTH / np.sqrt(d2)[:, None] * np.ones(2)
-    offset = cp.multiply(unit, w - gains.station / LENGTH)
-    quadratic = cp.sum(cp.square(offset), axis=1) - y_i / d2 <= q[:, 0]
+    away = cp.multiply(unit, w - gains.station / LENGTH)
+    quadratic = cp.sum(cp.square(away), axis=1) - y_i / d2 <= q[:, 0]
     return _exponentials(s.link, -c, c[..., None], q, gap), quadratic
 
 

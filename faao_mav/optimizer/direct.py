@@ -124,7 +124,7 @@ def direct(
     )
     found = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
     # values by tables may be above those of the precoders, and without shadowing more is delivered
-    history = np.maximum.accumulate([*list(begun.values())[:1], *reached.values()])
+    history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
     gain = None
     if before is not None:
         gain = found - _worth(problem, before.w, [before.P_B, before.P_U])

@@ -308,7 +308,6 @@ def make_solution(
 _ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "history")
 _RELAYED = ("received", "forwarded", "queue")
 _OPTIONAL = ("shares", "gain")
-_SCALARS = ("converged", "ending", *_OPTIONAL)
 _TEXTS = ("plan", "ending", "starts")
 
 
@@ -319,8 +318,8 @@ def save_solution(
 
     Keys: the arrays of `Solution` by name, those of its `relayed`, `R_avg`, `R_U`, `R_G`, `R_del`,
     `converged`, `ending`, `starts` (JSON text), `gain` if there is one and `plan`, the YAML text;
-    and the arrays `extra`,
-    which `load_solution` leaves alone. The same solution gives the same bytes.
+    and the arrays `extra`, which `load_solution` leaves alone. The same solution gives the same
+    bytes.
 
     >>> from tempfile import TemporaryDirectory
     >>> from faao_mav import load_solution, optimize, read_plan
@@ -331,7 +330,8 @@ def save_solution(
     >>> bool(np.all(loaded.w == solution.w))
     True
     """
-    values: dict[str, Any] = {name: getattr(solution, name) for name in (*_ARRAYS, *_SCALARS)}
+    names = (*_ARRAYS, *_OPTIONAL, "converged", "ending")
+    values: dict[str, Any] = {name: getattr(solution, name) for name in names}
     values |= {name: getattr(solution.rates, name) for name in ("R_avg", "R_U", "R_G")}
     values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
     values |= {

@@ -88,5 +88,6 @@ def _holder(data: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
 
 def _file(name: object, folder: Path) -> Path | None:
     """Return the file of that `name`; None for a value that is the content of one."""
-    is_name = isinstance(name, str) and "\n" not in name and not name.startswith(WORD)
-    return folder / str(name) if is_name else None
+    if not isinstance(name, str) or "\n" in name or name.startswith(WORD):
+        return None
+    return folder / name

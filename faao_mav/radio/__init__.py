@@ -11,5 +11,5 @@
 
 Everything is in linear SI units and vectorised over time slots, which lead every array's axes.
 Another alphabet is an entry of ``constellation._GRIDS``, another linear precoder a function in
-``precoder`` and an entry of ``SCHEMES``; ``plan/`` then accepts its name in plan.yaml.
+``precoder`` and an entry of ``SCHEMES``; its name joins those of the key in ``plan/``.
 """

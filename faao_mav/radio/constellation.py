@@ -1,7 +1,7 @@
 """Finite alphabets, and the differences between their vectors merged into classes.
 
-Each alphabet is kept unscaled on an integer grid (on the unit circle for 8-PSK), where sums,
-differences and products of symbols are exact, and is scaled to unit energy only when handed out.
+Each alphabet is kept unscaled on an integer grid, where sums, differences and products of symbols
+are exact (8-PSK on the unit circle, to rounding), and scaled to unit energy only when handed out.
 """
 
 from dataclasses import dataclass

@@ -39,7 +39,7 @@ _NEAREST = 2048
 """Classes, the nearest first, among which the smallest exponent is looked for. Chosen."""
 
 _TINY = 1e-300
-"""The least sum that is told from zero: s is above -691. It has all its digits."""
+"""The least sum that is told from zero, s is above -691, and the least power that is divided by."""
 
 
 def draw_rates(

@@ -4,12 +4,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from faao_mav.errors import FaaoError, counted
-from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.logs import read_log
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.gain import PER_DB
@@ -19,11 +18,14 @@ from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import Debriefing, FlightRecord, debriefing
 from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 
+if TYPE_CHECKING:
+    from faao_mav.fly.fly import FlightReport
+
 _SAME = 1e-5
 """Relative difference of two parameters that single precision does not tell apart."""
 
 
-def flight_lines(report: FlightReport, found: Debriefing | None) -> Iterator[Line]:
+def flight_lines(report: "FlightReport", found: Debriefing | None) -> Iterator[Line]:
     """Yield the lines of a flight that was watched: differences, what was `found`, its ending."""
     yield from (("different", str(each)) for each in report.differences)
     if found is not None:

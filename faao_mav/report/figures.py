@@ -10,7 +10,6 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.shadowing import Shadowed, arriving
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.report.debrief import FromLog
 from faao_mav.report.maps import mission_map, route_map
 from faao_mav.report.style import MUTED, SERIES, WIDTH, drawing, label, legend_above
 from faao_mav.schedule.conversion import Conversion
@@ -22,6 +21,8 @@ from faao_mav.workflow import Result
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from faao_mav.report.debrief import FromLog
 
 
 _COLOURS = {"planned": SERIES[0], "predicted": SERIES[1], "flown": SERIES[2]}
@@ -104,7 +105,7 @@ def mission_figures(check: Check, *, alone: bool) -> Iterator[Shown]:
         yield Shown("Energy", figure, title)
 
 
-def plan_figures(result: Result, log: FromLog | None = None) -> Iterator[Shown]:
+def plan_figures(result: Result, log: "FromLog | None" = None) -> Iterator[Shown]:
     """Yield those of a plan: as planned, as its mission is predicted, and as flown in a `log`."""
     solution, conversion, prediction = result.solution, result.conversion, result.prediction
     plan, t, rate = solution.plan, solution.t, solution.plan.radio.maximised

@@ -185,12 +185,16 @@ def _scheduler(plan: Plan, t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
         min_speed=least,
         max_speed=min(fastest, most),
         tolerance=plan.mission.path_tolerance,
-        altitude=plan.origin.elevation + plan.flight.altitude,
+        altitude=_altitude(plan),
         wind=plan.wind,
     )
 
 
+def _altitude(plan: Plan) -> float:
+    """Return the height of the flight above mean sea level, m."""
+    return plan.origin.elevation + plan.flight.altitude
+
+
 def _true_over_commanded(plan: Plan) -> float:
     """Return true over commanded airspeed at the height of the flight."""
-    altitude = plan.origin.elevation + plan.flight.altitude
-    return plan.aircraft.flight_model().true_over_commanded(altitude)
+    return plan.aircraft.flight_model().true_over_commanded(_altitude(plan))

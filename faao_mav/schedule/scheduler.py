@@ -77,7 +77,7 @@ class Scheduler(ABC):
 
     @abstractmethod
     def first(self, route: Route) -> Schedule:
-        """Return `route`, with the run-in that the plan needs, in its first fit to the plan."""
+        """Return `route`, which has the run-in that the plan needs, in its first fit to it."""
 
     @abstractmethod
     def refined(self, first: Schedule) -> Schedule:

@@ -31,9 +31,6 @@ ALLOWED = 1e-9
 TINY = float(np.finfo(float).tiny)
 """The smallest normal number: keeps a quotient finite where its denominator may be zero."""
 
-PACKED = np.array([[0, 1], [1, 2]])
-"""Which of xx, xy, yy the entries of a Hessian by x and y are."""
-
 
 @dataclass(frozen=True, slots=True)
 class Rows:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.constraint import PACKED, TINY, A, Constraint, Rows, V
+from faao_mav.arrays import PACKED, Real
+from faao_mav.optimizer.interior.constraint import TINY, A, Constraint, Rows, V
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.plan import Vector
 from faao_mav.power import PowerModel, PowerPartials

@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Real
-from faao_mav.optimizer.interior.constraint import PACKED, TINY, Constraint, Grid, Rows, W
+from faao_mav.arrays import PACKED, Flags, Real
+from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, Rows, W
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue, best_shares, forward_greedily
 
