@@ -20,10 +20,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from scipy.ndimage import maximum_filter
 
 from faao_mav import Plan, Solution, optimize, read_plan
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.map_file import map_archive
@@ -152,8 +151,14 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
     for link in solution.problem.links:
         H = link.channel(w, link.small_scale(w))
         rates.append(n * link.draw_rates(H, link.best(H[:, None])).reshape(x.shape))
-    reach = np.arange(-5, 6)
-    disc = np.hypot(reach[:, None], reach) <= kin.max_speed * h / step + 1e-9
+    along, reach = step * np.linspace(0, 1, 15), range(-5, 6)
+    steps = {  # and from where they pass over ground
+        (i, j): np.max([heights(ridges, x + a * i, y + a * j) for a in along], axis=0)
+        < plan.flight.altitude
+        for i in reach
+        for j in reach
+        if np.hypot(i, j) <= kin.max_speed * h / step + 1e-9
+    }
     most = rates[0].max() * rates[1].max() * stages / (rates[0].max() + rates[1].max())
     level = np.linspace(0, most, 60)
     gap, value = level[1], np.zeros((60, *x.shape))
@@ -162,7 +167,7 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
         after = (
             value
             if k == stages - 1
-            else np.stack([maximum_filter(v, footprint=disc) for v in value])
+            else np.max([_moved(value, *step) for step in steps.items()], axis=0)
         )
         found = []
         for share in (0.0, 0.5, 1.0) if plan.radio.duplex == "half" else (None,):
@@ -180,6 +185,13 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
             away | (heights(ridges, x, y) >= plan.flight.altitude), -1e9, np.max(found, axis=0)
         )
     return float(value[0].max()) / kin.slots
+
+
+def _moved(value: Real, by: tuple[int, int], on: Flags) -> Real:
+    """Return the `value` (..., i, j) so many cells away, where the way there is `on`."""
+    wide = np.pad(value, ((0, 0), (5, 5), (5, 5)), constant_values=-1e9)
+    (i, j), (rows, columns) = by, value.shape[1:]
+    return np.where(on, wide[:, 5 + i : 5 + i + rows, 5 + j : 5 + j + columns], -1e9)
 
 
 def main(seeds: list[int]) -> None:

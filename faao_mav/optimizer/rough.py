@@ -15,7 +15,7 @@ from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maxim
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.search.over_map import ROUGHLY, improved_over_map, starts_over_map
+from faao_mav.optimizer.search.over_map import ROUGHLY, flights_over_map, improved_over_map
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan
 from faao_mav.radio.relay import Relayed
@@ -72,7 +72,8 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
         if again is not None and every_excess(kin, limits, again) <= ALLOWED:
             found = {"known": again}
         else:
-            found = starts_over_map(problem, field, (_CELLS,))
+            along = next(flights_over_map(problem, field, _CELLS), None)
+            found = {} if along is None else {"map": along}
     if not found:
         found = starts(kin, ("straight",), {}, problem.free_area, kept)
     start, slow = next(iter(found.values())), kin.min_speed > 0

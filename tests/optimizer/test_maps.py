@@ -29,7 +29,7 @@ from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import map_bound, most_gain
 from faao_mav.optimizer.search.queue_sweep import QueueSweep
 from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.optimizer.search.sweep import cells_of, disc
+from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.ground import ground_areas, in_ground
 from faao_mav.radio.gain_map import GainMap, Grid
@@ -127,7 +127,8 @@ def test_a_sweep_is_the_best_of_all_paths(small_plan: MakePlan, kind: str) -> No
     rates = rng.uniform(0, 4, (2, count, *cells.x.shape[1:])) * rng.integers(
         0, 2, (2, count, *cells.x.shape[1:])
     )
-    sweep = QueueSweep.of(cells, rates, 400, disc(1.5, 0), relay, kin.time_step)
+    steps = Steps.over(np.ones(cells.x.shape[1:], dtype=np.bool_), disc(1.5, 0))
+    sweep = QueueSweep.of(cells, rates, 400, steps, relay, kin.time_step)
 
     def worth(places: list[int]) -> float:
         I_U, I_G = rates.reshape(2, count, -1)[:, range(count), places]
@@ -146,6 +147,23 @@ def test_a_sweep_is_the_best_of_all_paths(small_plan: MakePlan, kind: str) -> No
     path = [int(np.hypot(*(flat - place[:, None])).argmin()) for place in found]
     assert path in paths
     assert worth(path) == pytest.approx(max(map(worth, paths)), abs=0.05)
+
+
+def test_steps_lead_around_a_wall_that_is_thinner_than_they_are_long() -> None:
+    inside = np.ones((9, 12), dtype=np.bool_)
+    inside[:8, 5] = False
+    steps, cells = Steps.over(inside, disc(4.0, 0)), np.argwhere(inside)
+    values = np.where(inside, np.random.default_rng(3).random(inside.shape), -1.0)
+    best = steps.best(values)
+    for row, column in cells.tolist():
+        reached = {divmod(k, 12) for k in steps.ahead(row * 12 + column, inside.shape)}
+        for i, j in cells[np.hypot(*(cells - (row, column)).T) <= 4].tolist():
+            if (j - 5) * (column - 5) > 0:
+                assert (i, j) in reached
+            elif j != column:
+                crossed = row + (5 - column) * (i - row) / (j - column)
+                assert (i, j) not in reached or crossed > 7.4
+        assert best[row, column] == max(values[each] for each in reached)
 
 
 def delivered(I_U: Real, I_G: Real, kind: str) -> float:

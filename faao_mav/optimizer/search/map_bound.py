@@ -27,7 +27,7 @@ from faao_mav.radio.gain_map import Grid
 _DIRECTIONS = 5
 """Velocities between 0 and v_max along each axis that a run of slots is flown at. Chosen."""
 
-_COARSE_CELLS, _CELLS, _MAPPED_CELLS, _OWN_CELLS = 500, 60_000, 120_000, 20_000
+_COARSE_CELLS, _CELLS, _MAPPED_CELLS, _OWN_CELLS = 500, 60_000, 150_000, 20_000
 """Cells of the map where the price is sought, of the bound, of it over maps of gains, and of it
 where every slot has rates of its own. Measured on a site with ridges: 9.8 % above the plan with
 60,000, 8.3 % with 120,000 in twice the time."""

@@ -7,7 +7,7 @@ a tube about it, on the mean of the rates about each place: over less and less o
 is always the map as it is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +22,8 @@ from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
 from faao_mav.optimizer.search.map_bound import places_about
 from faao_mav.optimizer.search.queue_sweep import QueueSweep
-from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.optimizer.search.sweep import cells_of, disc
+from faao_mav.optimizer.search.straight import straight_flight, with_stops
+from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
 from faao_mav.optimizer.search.track import nearest_flight
 
 CELLS, _LEVELS, _REACH = (3_000, 5_000), 30, 4.0
@@ -52,6 +52,10 @@ ROUGHLY = _NARROWING[1:2]
 _ITERATIONS = 120
 """Steps of each of these searches at most. Measured: with 30 one of five sites ends 2 % lower."""
 
+_AGAIN = 5e-3
+"""The gain, in shares of what there is, above which a search is made again from where it ended: a
+flight that stops at bends has to move farther than a tube is wide. Chosen."""
+
 _TOLERANCE = 1e-4
 """Their tolerance, bit/s/Hz. Chosen."""
 
@@ -72,33 +76,56 @@ class Tube(Constraint):
         return Rows(value[None], -away[None] / self.radius, bend / self.radius**2)
 
 
-def starts_over_map(
-    problem: Problem, field: RateField, cells: Sequence[int] = CELLS
-) -> dict[str, Trajectory]:
-    """Return the flights nearest to the best paths over so many `cells`: `map`, `map 2` and on."""
+def starts_over_map(problem: Problem, field: RateField) -> dict[str, Trajectory]:
+    """Return the best flights along paths over so many cells: `map`, `map 2` and on."""
     found: dict[str, Trajectory] = {}
-    for count in cells:
-        rooms = (0.0,) if problem.free_area is None else _ROOMS
-        flights = (_flown(problem, queue_sweep(problem, field, count, room)) for room in rooms)
-        flight = next(filter(None, flights), None)
-        if flight is not None:
-            found[f"map {len(found) + 1}" if found else "map"] = flight
+    for count in CELLS:
+        flights = [*flights_over_map(problem, field, count)]
+        if flights:
+            best = max(flights, key=lambda flight: _worth(problem, field, flight))
+            found[f"map {len(found) + 1}" if found else "map"] = best
     return found
 
 
-def _flown(problem: Problem, sweep: QueueSweep) -> Trajectory | None:
-    """Return the flight nearest to the best path of a `sweep`; None where none keeps the fence."""
-    kin = problem.kinematics
+def flights_over_map(problem: Problem, field: RateField, cells: int) -> Iterator[Trajectory]:
+    """Yield flights along paths over so many `cells`, the farthest from obstacles first."""
+    path = np.empty((0, 2))
+    for room in (0.0,) if problem.free_area is None else _ROOMS:
+        sweep = queue_sweep(problem, field, cells, room)
+        before, path = path, sweep.path()
+        if not np.array_equal(before, path):
+            yield from _flown(problem, sweep, path)
+
+
+def _flown(problem: Problem, sweep: QueueSweep, places: Real) -> Iterator[Trajectory]:
+    """Yield flights that keep the fence along the `places` (K, 2) of a `sweep`, m.
+
+    They are the nearest, and that which stops where the way bends about obstacles.
+    """
+    kin, area = problem.kinematics, problem.free_area
     t = kin.time_step * np.arange(kin.slots)
     at = np.concatenate([[0.0], sweep.cells.instants, t[-1:]])
-    places = np.vstack([kin.start, sweep.path(), kin.end])
-    at, places = _around(problem.free_area, at, places)
+    at, places = _around(area, at, np.vstack([kin.start, places, kin.end]))
     path = np.stack([np.interp(t, at, each) for each in places.T], axis=1)
     about = problem.fenced(kin, (path, _NEAR * sweep.cells.side))
-    flight = nearest_flight(kin, path, straight_flight(kin), about)
+    flights = [nearest_flight(kin, path, straight_flight(kin), about)]
+    if area is not None and kin.min_speed == 0:
+        bends = _bends(area, places)
+        flights.append(with_stops(kin, [*places[bends]], at[bends]))
     limits = (*constraints_of(kin), *problem.fenced(kin))
-    kept = flight is not None and every_excess(kin, limits, flight) <= ALLOWED
-    return flight if kept else None
+    for flight in flights:
+        if flight is not None and every_excess(kin, limits, flight) <= ALLOWED:
+            yield flight
+
+
+def _bends(area: FreeArea, places: Real) -> list[int]:
+    """Return which of `places` (k, 2) a way needs: from one each time to the last in its sight."""
+    found, last = [0], len(places) - 1
+    while found[-1] < last:
+        ahead = range(last, found[-1] + 1, -1)
+        seen = (k for k in ahead if area.covers_path(places[[found[-1], k]]))
+        found.append(next(seen, found[-1] + 1))
+    return found[1:-1]
 
 
 def _around(area: FreeArea | None, t: Real, places: Real) -> tuple[Real, Real]:
@@ -136,12 +163,13 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
     way = float(kin.longest_ways()[0][-1])
     reach = float(np.clip(way / (100 * _side(problem, cells)), _REACH, 2 * _REACH))
     found = cells_of(kin, places, cells, reach, problem.free_area)
+    inside = np.ones(found.x.shape[1:], dtype=np.bool_)
     if problem.free_area is not None:
         x, ends = found.x.reshape(2, -1), np.stack([kin.start, kin.end])
-        inside = problem.free_area.inside(room * found.side).covers(x.T)
+        free = problem.free_area.inside(room * found.side).covers(x.T)
         near = np.hypot(*(x - ends[:, :, None]).swapaxes(0, 1)).min(axis=0) < 2 * found.side
-        inside |= near & problem.free_area.covers(x.T)
-        found = replace(found, alive=found.alive & inside.reshape(found.x.shape[1:]))
+        inside = (free | near & problem.free_area.covers(x.T)).reshape(inside.shape)
+        found = replace(found, alive=found.alive & inside)
     if any(link.gains.station.ndim > 1 for link in problem.links):
         slots = [int(block[len(block) // 2]) for block in found.blocks]
         fields = [field.in_slot(slot) for slot in slots]
@@ -154,7 +182,7 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         found,
         counts[:, None, None] * rates,
         _LEVELS,
-        disc(step + _BETWEEN, 0),
+        Steps.over(inside, disc(step + _BETWEEN, 0)),
         relay,
         kin.time_step,
     )
@@ -172,29 +200,36 @@ def improved_over_map(
     smooth, side = field.smoothed(), _side(problem, CELLS[0])
     energy = problem.energy_limit(kin)
 
-    def value(flight: Trajectory) -> float:
-        return objective(field.value(flight.w.T), kin, relay)
-
-    now, best = start, LocalOptimum(start, value(start), 0, np.inf, False)
+    now, worth = start, _worth(problem, field, start)
+    best = LocalOptimum(start, worth, 0, np.inf, False)
     for radius, spread in searches:
-        found = maximize(
-            kin,
-            Blurred(smooth, spread * side),
-            now,
-            constraints=(
-                *problem.fenced(kin, (now.w, radius * side)),
-                *([] if energy is None else [energy]),
-                Tube(now.w.T / LENGTH, radius * side / LENGTH),
-            ),
-            tolerance=_TOLERANCE,
-            max_iterations=iterations,
-            warm=True,
-            relay=relay,
-        )
-        now = found.trajectory
-        if (worth := value(now)) > best.value:
-            best = replace(found, value=worth)
+        gain = np.inf
+        while gain > _AGAIN * worth:
+            found = maximize(
+                kin,
+                Blurred(smooth, spread * side),
+                now,
+                constraints=(
+                    *problem.fenced(kin, (now.w, radius * side)),
+                    *([] if energy is None else [energy]),
+                    Tube(now.w.T / LENGTH, radius * side / LENGTH),
+                ),
+                tolerance=_TOLERANCE,
+                max_iterations=iterations,
+                warm=True,
+                relay=relay,
+            )
+            now, before = found.trajectory, worth
+            worth = _worth(problem, field, now)
+            gain = worth - before
+            if worth > best.value:
+                best = replace(found, value=worth)
     return best
+
+
+def _worth(problem: Problem, field: RateField, flight: Trajectory) -> float:
+    """Return what `problem` maximises, bit/s/Hz, along a `flight` by `field`."""
+    return objective(field.value(flight.w.T), problem.kinematics, problem.maximised_queue)
 
 
 def _side(problem: Problem, cells: int) -> float:

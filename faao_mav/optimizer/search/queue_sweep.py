@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.search.sweep import Cells, largest_near
+from faao_mav.optimizer.search.sweep import Cells, Steps
 from faao_mav.radio.relay import RelayQueue
 
 _NOWHERE = -1e9
@@ -28,14 +28,14 @@ class QueueSweep:
     """Best paths by place and level: `rates` (2, K, i, j) of both hops over `cells`, bits.
 
     They are those of all slots of an instant together. `levels` (L,) are even, bits per hertz and
-    slot; below 0, without a queue, more has been sent than was received. `rows` is what a step
-    reaches, as `Cells` has them.
+    slot; below 0, without a queue, more has been sent than was received. `steps` lead from
+    cell to cell.
     """
 
     cells: Cells
     rates: Real
     levels: Real
-    rows: list[tuple[int, int]]
+    steps: Steps
     half: bool
     queued: bool
 
@@ -45,7 +45,7 @@ class QueueSweep:
         cells: Cells,
         rates: Real,
         levels: int,
-        rows: list[tuple[int, int]],
+        steps: Steps,
         relay: RelayQueue | None,
         time_step: float,
     ) -> "QueueSweep":
@@ -57,7 +57,7 @@ class QueueSweep:
             cells,
             rates,
             np.linspace(-most if relay is None else 0.0, most, levels),
-            rows,
+            steps,
             relay is not None and relay.half,
             relay is not None,
         )
@@ -65,16 +65,11 @@ class QueueSweep:
     def path(self) -> Real:
         """Return the best path, the places (K, 2) at the instants, m."""
         ahead = [each.reshape(len(self.levels), -1) for each in self._backward()][::-1]
-        columns = self.cells.x.shape[2]
-        row, column = np.divmod(np.arange(ahead[0].shape[1]), columns)
-        reach = dict(self.rows)
         level = np.zeros(1)
         places = [int(self._between(ahead[0], level).argmax())]
         for k, after in enumerate(ahead[1:]):
             here = places[-1]
-            apart = np.abs(row - row[here])
-            across = np.array([reach.get(step, -1) for step in range(int(apart.max()) + 1)])
-            near = np.flatnonzero(np.abs(column - column[here]) <= across[apart])
+            near = self.steps.ahead(here, self.cells.x.shape[1:])
             rates = self.rates[:, k].reshape(2, -1)[:, here, None]
             found = [
                 (sent + self._between(after[:, near], left), left)
@@ -93,7 +88,7 @@ class QueueSweep:
             best = np.max([sent + self._between(after, left) for sent, left in options], axis=0)
             found = np.where(self.cells.alive[k], best, _NOWHERE)
             yield found
-            after = largest_near(found, self.rows)
+            after = self.steps.best(found)
 
     def _after(self, level: Real, I_U: Real, I_G: Real) -> Iterator[tuple[Real, Real]]:
         """Yield what is sent from a `level` on, and the level that is left."""

@@ -1,6 +1,7 @@
 """Feasible flights along straight lines: at the most even speed, or quick with stops between."""
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -116,14 +117,17 @@ def _flight_aside(kin: Kinematics) -> Trajectory:
     return flight
 
 
-def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
+def with_stops(
+    kin: Kinematics, stops: Sequence[Real], times: Real | None = None
+) -> Trajectory | None:
     """Return the flight that stops at `stops`, straight between them; None if the time is short.
 
-    Between stops it is as quick as it can be, and hovers at each for an even part of the rest.
+    Between stops it is as quick as it can be. It leaves them as near to `times`, s, as the others
+    allow; without, it hovers at each for an even part of the rest.
     """
-    if not stops:
+    if not len(stops):
         return straight_flight(kin)
-    legs, spare = list[Real](), kin.slots - 1
+    legs = list[Real]()
     for k, (a, b) in enumerate(pairwise([kin.start, *stops, kin.end])):
         first, last = k == 0, k == len(stops)
         leg = _quickest(
@@ -131,7 +135,6 @@ def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
                 kin,
                 start=a,
                 end=b,
-                slots=spare + 1,
                 start_velocity=kin.start_velocity if first else np.zeros(2),
                 end_velocity=kin.end_velocity if last else np.zeros(2),
                 bound_first_acceleration=kin.bound_first_acceleration or not first,
@@ -139,12 +142,19 @@ def with_stops(kin: Kinematics, stops: list[Real]) -> Trajectory | None:
         )
         if leg is None:
             return None
-        spare -= len(leg) - 1
         legs.append(leg)
-    for k in range(len(stops)):
-        hover = spare // len(stops) + (k < spare % len(stops))
-        legs[k + 1] = np.vstack([np.zeros((hover, 2)), legs[k + 1][1:]])
-    return kin.follow(np.vstack(legs))
+    begins = np.cumsum([0, *(len(leg) - 1 for leg in legs)])
+    spare = kin.slots - 1 - int(begins[-1])
+    if spare < 0:
+        return None
+    share = np.arange(1, len(legs)) / len(stops)
+    waited = spare * share if times is None else times / kin.time_step - begins[1:-1]
+    waited = np.maximum.accumulate(np.clip(np.rint(waited), 0, spare)).astype(int)
+    velocities = np.zeros((kin.slots, 2))
+    delays = np.array([0, *waited[:-1], spare])
+    for begin, leg in zip(begins[:-1] + delays, legs, strict=True):
+        velocities[begin : begin + len(leg)] = leg
+    return kin.follow(velocities)
 
 
 def _quickest(kin: Kinematics) -> Real | None:

@@ -73,6 +73,64 @@ def largest_near(values: Real, rows: Sequence[tuple[int, int]]) -> Real:
     return best
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """Steps from cell to cell of a grid (i, j), none of which passes through an obstacle.
+
+    `rows` is what they reach; `near` (M,) are the cells with an obstacle within reach, by their
+    number; `targets` (M, S) the cells that each of them reaches, `ways` which of those steps pass.
+    """
+
+    rows: list[tuple[int, int]]
+    near: Integers
+    targets: Integers
+    passable: Flags
+
+    @classmethod
+    def over(cls, inside: Flags, rows: list[tuple[int, int]]) -> "Steps":
+        """Return the steps over cells that are `inside` (i, j), of which none leaves them."""
+        offsets = np.array(
+            [
+                (sign * row, column)
+                for row, columns in rows
+                for sign in ((-1, 1) if row else (1,))
+                for column in range(-columns, columns + 1)
+            ]
+        )
+        margin = int(np.abs(offsets).max())
+        wide = np.pad(inside, margin, constant_values=True)
+        blocked = largest_near((~inside).astype(np.float64), rows) > 0
+        near = np.flatnonzero(blocked & inside)
+        here = np.stack(np.divmod(near, inside.shape[1]), axis=1)[:, None]
+        ends = here + offsets
+        passable = np.all((ends >= 0) & (ends < inside.shape), axis=2)
+        for share in np.arange(1, 2 * margin + 1) / (2 * margin):
+            at = here + np.rint(share * offsets).astype(np.intp) + margin
+            passable &= wide[at[..., 0], at[..., 1]]
+        ends = np.clip(ends, 0, np.array(inside.shape) - 1)
+        return cls(rows, near, ends[..., 0] * inside.shape[1] + ends[..., 1], passable)
+
+    def best(self, values: Real) -> Real:
+        """Return the largest of `values` (..., i, j) that a step from each cell leads to."""
+        found = largest_near(values, self.rows)
+        if len(self.near):
+            flat = values.reshape(*values.shape[:-2], -1)
+            ahead = np.where(self.passable, flat[..., self.targets], -np.inf).max(axis=-1)
+            found.reshape(flat.shape)[..., self.near] = ahead
+        return found
+
+    def ahead(self, cell: int, shape: tuple[int, int]) -> Integers:
+        """Return the cells that steps from a `cell` lead to, by their number."""
+        at = np.flatnonzero(self.near == cell)
+        if len(at):
+            return np.asarray(self.targets[at[0]][self.passable[at[0]]])
+        row, column = np.divmod(np.arange(shape[0] * shape[1]), shape[1])
+        reach = dict(self.rows)
+        apart = np.abs(row - row[cell])
+        across = np.array([reach.get(step, -1) for step in range(int(apart.max()) + 1)])
+        return np.flatnonzero(np.abs(column - column[cell]) <= across[apart])
+
+
 def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
     """Return for each of `reaches` the largest of `values` (..., n) up to so many places away.
 
