@@ -2,11 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Unpack
 
 from faao_mav.errors import LinkError
-from faao_mav.fly.preflight import Flight, preflight
+from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import POSITION_RATE, Ending, read_held
 from faao_mav.fly.watch import Watch
@@ -80,17 +79,17 @@ def fly_mission(
             wrong += held.other_than(sent, part, peer.vehicle) if sent else ()
         if wrong:
             return FlightReport(vehicle, tuple(wrong), None, FlightRecord.of(()))
-        gate = partial(preflight, flight, elsewhere=elsewhere, untimed=untimed)
+        allowed = {"elsewhere": elsewhere, "untimed": untimed}
+        gate = Clearance(flight, peer, held, judged=judged, **allowed)
         if flight.streamed and flight.solution is not None:
-            watch: Watch = Stream(peer, flight.solution, held, gate, rate=rate)
+            watch: Watch = Stream(gate, rate=rate)
         else:
-            before = gate if judged else None
-            watch = Watch(peer, held, before, arm=arm, lands=lands, rate=rate)
+            watch = Watch(gate, arm=arm, lands=lands, rate=rate)
         watch.seen.strangers = session.strangers
         try:
             beats = arm or watch.streams
             ending = session.watch(watch, lambda: watching(watch), beats=beats)
         except LinkError as error:
             ending = Ending("lost", str(error))
-    found = watch.findings or ()
+    found = gate.findings or ()
     return FlightReport(vehicle, (), ending, watch.seen.record(), watch.relay_start, found)

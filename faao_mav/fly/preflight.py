@@ -4,7 +4,8 @@ Nothing is armed while `preflight` finds an error. It is one gate for missions a
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import TYPE_CHECKING
@@ -12,24 +13,20 @@ from typing import TYPE_CHECKING
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.autopilot.manners import FenceAction
-from faao_mav.errors import counted
-from faao_mav.fly.telemetry import Held, Telemetry
+from faao_mav.errors import InputError, counted
+from faao_mav.fly.telemetry import Ending, Held, Telemetry, read_held
 from faao_mav.mission.item import Home, Mission
 from faao_mav.validate import Check, Limits, check, predicted
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.speeds import beyond_lean
+from faao_mav.wire import whereabouts
+from faao_mav.wire.machine import Script
+from faao_mav.wire.messages import Message
 from faao_mav.wire.parameters import number_in
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.whereabouts import (
-    FIRST_AWAY,
-    FIRST_FARTHEST,
-    HOME_AWAY,
-    HOME_HIGHER,
-    Whereabouts,
-    distance,
-    shown,
-)
-from faao_mav.wire.wire_items import wire_items
+from faao_mav.wire.transfer import Peer
+from faao_mav.wire.whereabouts import Whereabouts
+from faao_mav.wire.wire_items import mission_of, wire_items
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
@@ -38,6 +35,10 @@ if TYPE_CHECKING:
 LEAST_BATTERY = 30
 """Percent of the battery with which a flight begins at least, where nothing tells what it takes.
 Chosen: twice what PX4 takes for low by default."""
+
+_LOOK = 5.0
+"""Seconds after which it is told what stands against a flight, though the vehicle's place is not
+known; chosen."""
 
 _AT_FENCE: dict[FenceAction, str] = {
     "nothing": "flies on",
@@ -94,6 +95,67 @@ class Flight:
         return replace(self.mission, home=home)
 
 
+class Clearance:
+    """Whether the vehicle of `peer`, which `held` this, is clear for `flight`: see `preflight`.
+
+    `findings` is what that has found last; None before enough is heard of the vehicle, and of one
+    that is not `judged`.
+    """
+
+    def __init__(
+        self,
+        flight: Flight,
+        peer: Peer,
+        held: Held,
+        *,
+        judged: bool = True,
+        elsewhere: bool = False,
+        untimed: bool = False,
+    ) -> None:
+        self.flight, self.peer, self.held = flight, peer, held
+        self.findings: tuple[Finding, ...] | None = None
+        self.reading: Script[Held] | None = None
+        self._is_judged, self._elsewhere, self._untimed = judged, elsewhere, untimed
+        self._state: tuple[object, ...] = ()
+
+    def judge(self, seen: Telemetry, now: float, *, again: bool = False) -> None:
+        """Look, once enough is heard, and `again` or when that is another state."""
+        known = seen.place is not None and seen.status is not None
+        heard = seen.heartbeat is not None and (known or now >= seen.begun + _LOOK)
+        others = len(seen.stations), len(seen.strangers)
+        state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
+        if self._is_judged and heard and (again or state != self._state):
+            allowed = {"elsewhere": self._elsewhere, "untimed": self._untimed}
+            self._state, self.findings = state, preflight(self.flight, self.held, seen, **allowed)
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether it has looked, and found no error."""
+        return self.findings is not None and not self._errors
+
+    @property
+    def _errors(self) -> list[Finding]:
+        return [each for each in self.findings or () if each.level is Level.ERROR]
+
+    def refusal(self) -> Ending | None:
+        """Return how a flight ends that is not started for an error; a place is waited for."""
+        stops = [each for each in self._errors if each.rule != "position-unknown"]
+        told = "; ".join(f"{each.message} ({each.action})" for each in stops)
+        contested = any(each.rule == "ground-station" for each in stops)
+        ending = Ending("contested" if contested else "refused", f"nothing was started: {told}")
+        return ending if stops else None
+
+    def read_again(self, now: float) -> Sequence[Message] | None:
+        """Read once more what it holds; return what to say for that, None once it is read."""
+        if self.reading is None:
+            self.reading = Script(read_held(self.peer))
+            return self.reading.start(now)
+        if self.reading.outcome is None:
+            return self.reading.tick(now)
+        self.held = self.reading.outcome
+        return None
+
+
 def preflight(
     flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool = False, untimed: bool = False
 ) -> tuple[Finding, ...]:
@@ -137,7 +199,10 @@ def _judged(flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool) -> 
 
     How a mission keeps its plan does not matter to a stream, which does it by setpoints.
     """
-    mission, solution = held.beside(flight.placed, seen.vehicle), flight.solution
+    mission, solution = flight.placed, flight.solution
+    with suppress(InputError):  # which is told as another list than the file's
+        own = mission_of(held.lists, seen.vehicle)
+        mission = replace(mission, fence=own.fence, rally=own.rally)
     if seen.place is not None and (elsewhere or Whereabouts.of(seen.place, mission).is_meant):
         mission = replace(mission, home=seen.place)
     vehicle = replace(
@@ -177,18 +242,18 @@ def _place(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
         return
     stands = Whereabouts.of(place, flight.placed)
     away, higher, first = stands.from_home, stands.higher, stands.from_first
-    if away is not None and not away <= HOME_AWAY:
-        yield _found("place-home", away=shown(away), most=HOME_AWAY)
-    if higher is not None and not abs(higher) <= HOME_HIGHER:
-        yield _found("place-height", stands=stands, most=HOME_HIGHER)
+    if away is not None and not away <= whereabouts.HOME_AWAY:
+        yield _found("place-home", away=whereabouts.shown(away), most=whereabouts.HOME_AWAY)
+    if higher is not None and not abs(higher) <= whereabouts.HOME_HIGHER:
+        yield _found("place-height", stands=stands, most=whereabouts.HOME_HIGHER)
     if away is not None and higher is None:
         yield _found("place-height-unknown")
-    if first is not None and not first <= FIRST_AWAY:
-        near = away is not None and first <= FIRST_FARTHEST
-        yield _found("place-first", Level.WARNING if near else None, away=shown(first))
-    off = 0.0 if home is None else distance(place, (home.latitude, home.longitude))
-    if not off <= HOME_AWAY:
-        yield _found("returns-elsewhere", away=shown(off))
+    if first is not None and not first <= whereabouts.FIRST_AWAY:
+        near = away is not None and first <= whereabouts.FIRST_FARTHEST
+        yield _found("place-first", Level.WARNING if near else None, away=whereabouts.shown(first))
+    off = 0.0 if home is None else whereabouts.distance(place, (home.latitude, home.longitude))
+    if not off <= whereabouts.HOME_AWAY:
+        yield _found("returns-elsewhere", away=whereabouts.shown(off))
 
 
 def _lists(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterator[Finding]:

@@ -13,12 +13,7 @@ from faao_mav.autopilot import AutopilotFamily
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan.sections import Origin
-from faao_mav.wire.messages import (
-    GlobalPositionInt,
-    GpsGlobalOrigin,
-    SetPositionTargetLocalNed,
-    Timesync,
-)
+from faao_mav.wire import messages
 from faao_mav.wire.protocol import Address
 
 _LOCAL_NED, _NO_YAW = 1, 1 << 10 | 1 << 11
@@ -137,12 +132,12 @@ class OwnClock:
         self._read = deque[tuple[float, float]](maxlen=_KEPT)
         """When we were in the middle of a short trip, and what the vehicle's clock read, s."""
 
-    def ask(self, now: float) -> Timesync:
+    def ask(self, now: float) -> messages.Timesync:
         """Return the question, with the time `now` in it, which the answer repeats."""
         self._asked.append(int(now * 1e9))
-        return Timesync(0, self._asked[-1])
+        return messages.Timesync(0, self._asked[-1])
 
-    def hear(self, answer: Timesync, now: float) -> None:
+    def hear(self, answer: messages.Timesync, now: float) -> None:
         """Take note of an answer."""
         asked = answer.ts1 / 1e9
         if answer.tc1 and answer.ts1 in self._asked:
@@ -185,24 +180,24 @@ class OwnFrame:
     def __init__(self, family: AutopilotFamily, plan_origin: Origin) -> None:
         self._family = family
         self._plans = LocalFrame(plan_origin.latitude, plan_origin.longitude)
-        self.origin: GpsGlobalOrigin | None = None
+        self.origin: messages.GpsGlobalOrigin | None = None
         self.home: int | None = None
 
-    def risen(self, position: GlobalPositionInt) -> float:
+    def risen(self, position: messages.GlobalPositionInt) -> float:
         """Return by how many metres home is higher now than at the departure."""
         return (position.alt - position.relative_alt - self._home(position)) / 1000
 
-    def _home(self, position: GlobalPositionInt) -> int:
+    def _home(self, position: messages.GlobalPositionInt) -> int:
         return position.alt - position.relative_alt if self.home is None else self.home
 
-    def place(self, position: GlobalPositionInt) -> Real:
+    def place(self, position: messages.GlobalPositionInt) -> Real:
         """Return where it is: (3,) m east, north, up of the plan's origin, which is its home."""
         level = self._plans.to_local(position.lat / 1e7, position.lon / 1e7)
         return np.append(level, (position.alt - self._home(position)) / 1000)
 
     def message(
-        self, setpoint: Setpoint, position: GlobalPositionInt, target: Address
-    ) -> SetPositionTargetLocalNed:
+        self, setpoint: Setpoint, position: messages.GlobalPositionInt, target: Address
+    ) -> messages.SetPositionTargetLocalNed:
         """Return `setpoint` for the vehicle `target` that has told its `position`."""
         assert self.origin is not None
         own = self._family.local_frame(self.origin.latitude / 1e7, self.origin.longitude / 1e7)
@@ -210,6 +205,6 @@ class OwnFrame:
         east, north = own.to_local(*self._plans.to_geodetic(p[:2]))
         home = (self._home(position) - self.origin.altitude) / 1000
         values = (north, east, -(p[2] + home), v[1], v[0], -v[2], a[1], a[0], -a[2])
-        return SetPositionTargetLocalNed(
+        return messages.SetPositionTargetLocalNed(
             target, position.time_boot_ms, _LOCAL_NED, _NO_YAW, *map(float, values)
         )

@@ -7,20 +7,13 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.fly.itinerary import LEVEL, Itinerary
+from faao_mav.fly.preflight import Clearance
 from faao_mav.fly.setpoints import OwnClock, OwnFrame, Setpoint, at_rest
-from faao_mav.fly.telemetry import PATIENCE, Held
-from faao_mav.fly.watch import ACCEPTED, Order, Preflight, Watch
-from faao_mav.optimizer.solution import Solution
-from faao_mav.wire.messages import (
-    CommandLong,
-    CurrentMode,
-    GlobalPositionInt,
-    GpsGlobalOrigin,
-    Message,
-    Timesync,
-)
+from faao_mav.fly.telemetry import PATIENCE
+from faao_mav.fly.watch import ACCEPTED, Order, Watch
+from faao_mav.wire import messages
+from faao_mav.wire.messages import Message
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
-from faao_mav.wire.transfer import Peer
 
 _OFF_GROUND, _SLOW_CLIMB = 0.3, 0.5
 """Metres above home from which on a take-off is under way, though its answer is lost; and the least
@@ -43,7 +36,7 @@ _FAILSAFE = "it is in its failsafe, until setpoints come again"
 
 
 class Stream(Watch):
-    """A watch that arms the vehicle of `peer`, and flies `solution` by setpoints.
+    """A watch that arms the vehicle of `gate`, and flies the solution of its flight by setpoints.
 
     `rate` times a second of the vehicle's own clock, whenever it tells where it is, it is told
     where to be: see `Itinerary`, of which `flight` is one; in the end what `mission.on_finish`
@@ -57,26 +50,20 @@ class Stream(Watch):
 
     streams = True
 
-    def __init__(
-        self,
-        peer: Peer,
-        solution: Solution,
-        held: Held,
-        preflight: Preflight,
-        *,
-        rate: float = 10.0,
-    ) -> None:
+    def __init__(self, gate: Clearance, *, rate: float = 10.0) -> None:
+        solution = gate.flight.solution
+        assert solution is not None
         plan, finish = solution.plan, solution.plan.mission.on_finish
-        super().__init__(peer, held, preflight, arm=True, lands=finish != "hover", rate=rate)
+        super().__init__(gate, arm=True, lands=finish != "hover", rate=rate)
         if self._modes.guided is None:
             raise InputError("--stream: only copters fly by setpoints")
         self._flown, self._rules = self._modes.guided, self._family.setpoints
         self._height, self._top = plan.flight.altitude, plan.max_ground_speed
-        engage = self._family.mode_parameters(self._flown)
-        self._left = [("engaging", MavCommand.SET_MODE, engage), ("arming", MavCommand.ARM, (1.0,))]
+        self._left = [("engaging", self._to_set(self._flown)), self._left[0]]
         self._by_setpoints = self._rules.takes_off_by_setpoints
         if not self._by_setpoints:
-            self._left.append(("starting", MavCommand.TAKEOFF, (*[0.0] * 6, self._height)))
+            climb = Order(MavCommand.TAKEOFF, (*[0.0] * 6, self._height))
+            self._left.append(("starting", climb))
         after = self._modes.at_fence
         self._finish = after["return" if finish == "rtl" else "land" if self._lands else "hold"]
         self._period = 1 / rate
@@ -97,13 +84,15 @@ class Stream(Watch):
             self._unsure_since, self.seen.wanted = now, None  # it may be in another mode since
         super()._hear(message, now)
         match message:
-            case GpsGlobalOrigin():
+            case messages.GpsGlobalOrigin():
                 self._frame.origin = message
-            case Timesync():
+            case messages.Timesync():
                 self._clock.hear(message, now)
-            case CurrentMode(custom_mode=mode) if in_flight:
+            case messages.CurrentMode(custom_mode=mode) if in_flight:
                 self._on_mode(mode, now)
-            case GlobalPositionInt() if self.outcome is None and message is self.seen.position:
+            case messages.GlobalPositionInt() if (
+                self.outcome is None and message is self.seen.position
+            ):
                 self._on_position(message, now)
 
     def _look(self, now: float) -> None:
@@ -115,7 +104,7 @@ class Stream(Watch):
             return
         if self.phase == "checking" and self._frame.origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
-            self._out.append(CommandLong(self._peer.address, *ask))
+            self._out.append(messages.CommandLong(self._peer.address, *ask))
         self._out.append(self._clock.ask(now))
 
     def _lacks(self, now: float) -> str:
@@ -159,7 +148,7 @@ class Stream(Watch):
         """
         led = self.phase in ("flying", "ending") or (self.phase == "holding" and self._order)
         wanted, since = self.seen.wanted, self._unsure_since
-        by_itself = led and self._rules.comes_back_from(mode, self._held.reading.values)
+        by_itself = led and self._rules.comes_back_from(mode, self.gate.held.reading.values)
         if by_itself and wanted is None and (since is None or now <= since + _TOLD_BY):
             self._unsure_since = since or now
             return
@@ -187,7 +176,7 @@ class Stream(Watch):
 
     # ---- where it is to be
 
-    def _on_position(self, position: GlobalPositionInt, now: float) -> None:
+    def _on_position(self, position: messages.GlobalPositionInt, now: float) -> None:
         t, place = position.time_boot_ms / 1000, self._frame.place(position)
         velocity = np.array([position.vy, position.vx, -position.vz]) / 100
         if self._clock.age(t, now) > _OLD:
@@ -211,7 +200,7 @@ class Stream(Watch):
         over = self.flight.part == "over" and self.seen.custom_mode == self._flown
         if self.phase == "flying" and over:
             self._path = (self._flown, self._finish)
-            self._set_mode(now, self._finish)
+            self._give(self._to_set(self._finish), now)
             self.phase = "ending"
         if self.phase == "engaging":
             self._repeat(now)
@@ -223,7 +212,7 @@ class Stream(Watch):
     @property
     def _without_setpoints(self) -> float:
         """For how many of the world's seconds it keeps its mode without setpoints."""
-        kept = {**self._rules.defaults, **self._held.reading.values}[self._rules.timeout]
+        kept = {**self._rules.defaults, **self.gate.held.reading.values}[self._rules.timeout]
         return kept / max(self._clock.speed, 1.0)
 
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:

@@ -2,50 +2,25 @@
 
 import math
 from collections.abc import Mapping, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.errors import InputError
-from faao_mav.mission.item import Home, Mission
+from faao_mav.mission.item import Home
 from faao_mav.validate.flown import Fix, FlightRecord
+from faao_mav.wire import messages, protocol
 from faao_mav.wire.jobs import download_lists
 from faao_mav.wire.machine import Talk
-from faao_mav.wire.messages import (
-    BatteryStatus,
-    CommandLong,
-    CurrentMode,
-    Envelope,
-    GlobalPositionInt,
-    Heartbeat,
-    HomePosition,
-    LocalPositionNed,
-    Message,
-    MissionCurrent,
-    MissionItemInt,
-    MissionRequestInt,
-    Statustext,
-    SysStatus,
-    WireItem,
-)
+from faao_mav.wire.messages import Envelope, Message, WireItem
 from faao_mav.wire.parameters import Reading, read_parameters
-from faao_mav.wire.protocol import (
-    CURRENT_ITEM,
-    CURRENT_MODE,
-    GROUND_STATION_TYPE,
-    HOME_POSITION,
-    LOCAL_POSITION,
-    POSITION,
-    SYSTEM_STATUS,
-    MavCommand,
-    MavSeverity,
-    MissionType,
-)
+from faao_mav.wire.protocol import MavCommand, MissionType
 from faao_mav.wire.questions import ask_for
 from faao_mav.wire.transfer import PartReport, Peer
 from faao_mav.wire.verify import Difference, compare
 from faao_mav.wire.whereabouts import home_in, place_in
-from faao_mav.wire.wire_items import home_items, mission_of
+from faao_mav.wire.wire_items import home_items
 
 Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
@@ -71,6 +46,8 @@ items that are read again. Chosen."""
 
 _PROPULSION = (0, 1, 2)
 """MAV_BATTERY_FUNCTION of batteries that keep the aircraft in the air: unknown, all, propulsion."""
+
+_WARNING = protocol.MavSeverity.WARNING
 
 _BACK = 2000
 """Milliseconds by which a vehicle's clock goes back when it has rebooted; less is a late packet."""
@@ -100,21 +77,10 @@ class Held:
         found = compare(sent, self.lists.get(part, ()), part, vehicle)
         return tuple(each for each in found if each.kind == "wrong")
 
-    def beside(self, mission: Mission, vehicle: VehicleType) -> Mission:
-        """Return `mission` with the fence and the rally points that are held."""
-        try:
-            held = mission_of(self.lists, vehicle)
-        except InputError:  # told as another list than the file's
-            return mission
-        return replace(mission, fence=held.fence, rally=held.rally)
-
 
 def read_held(
-    peer: Peer,
-    parts: Sequence[MissionType] = tuple(MissionType),
-    *,
-    parameters: bool = True,
-) -> Talk["Held"]:
+    peer: Peer, parts: Sequence[MissionType] = tuple(MissionType), *, parameters: bool = True
+) -> Talk[Held]:
     """Read what the vehicle of `peer`, which has to be one that is known, holds.
 
     That are the lists `parts`, and with `parameters` these and its home.
@@ -129,11 +95,10 @@ def read_held(
     if vehicle.modes.guided is not None:
         names += [(name,) for name in vehicle.family.setpoints.defaults]
     reading = yield from read_parameters(peer, names)
-    told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
-    try:
+    told = yield from ask_for(peer.address, protocol.HOME_POSITION, messages.HomePosition)
+    home = None
+    with suppress(InputError):
         home = None if told is None else home_in(told)
-    except InputError:
-        home = None
     return Held(lists.items, reading, lists.missing, home)
 
 
@@ -179,12 +144,12 @@ class Telemetry:
         self.told: list[str] = []
         self.said: list[str] = []
         self.fixes: list[Fix] = []
-        self.heartbeat: Heartbeat | None = None
-        self.current: MissionCurrent | None = None
-        self.status: SysStatus | None = None
-        self.position: GlobalPositionInt | None = None
+        self.heartbeat: messages.Heartbeat | None = None
+        self.current: messages.MissionCurrent | None = None
+        self.status: messages.SysStatus | None = None
+        self.position: messages.GlobalPositionInt | None = None
         self.knows_place = False
-        self.wanted: CurrentMode | None = None
+        self.wanted: messages.CurrentMode | None = None
         self.place: Home | None = None
         self.stations: set[str] = set()
         self.strangers: Set[str] = set()
@@ -192,9 +157,9 @@ class Telemetry:
         self._batteries: dict[int, int] = {}
         self.disarmed_at = math.inf
         self._beat_at = self._placed_at = -math.inf
-        self._periods = {POSITION: 1 / rate, SYSTEM_STATUS: 1.0, CURRENT_ITEM: 1.0}
+        self._periods = dict.fromkeys((protocol.SYSTEM_STATUS, protocol.CURRENT_ITEM), 1.0)
+        self._periods[protocol.POSITION] = 1 / rate
         self._next_item = self._home
-        self.start(0.0)
 
     def start(self, now: float) -> None:
         """Begin to listen."""
@@ -260,10 +225,11 @@ class Telemetry:
     def hear(self, envelope: Envelope, now: float) -> None:
         """Take note of a message."""
         sender, message = envelope.sender, envelope.message
-        of_station = isinstance(message, Heartbeat) and message.type == GROUND_STATION_TYPE
-        if of_station and str(sender) not in self.stations:
-            self.stations.add(str(sender))
-            self.told.append(f"another ground station is on this link: {sender}")
+        match message:
+            case messages.Heartbeat(type=protocol.GROUND_STATION_TYPE):
+                if str(sender) not in self.stations:
+                    self.stations.add(str(sender))
+                    self.told.append(f"another ground station is on this link: {sender}")
         if sender != self._peer.address:
             return
         self.silence, self.heard_at = now - self.heard_at, now
@@ -271,73 +237,71 @@ class Telemetry:
             self._is_silent = False
             self.told.append(f"heard again after {self.silence:.0f} s")
         match message:
-            case BatteryStatus(battery_function=function) if function in _PROPULSION:
+            case messages.BatteryStatus(battery_function=function) if function in _PROPULSION:
                 self._batteries[message.id] = message.battery_remaining
-            case Heartbeat(armed=armed):
+            case messages.Heartbeat(armed=armed):
                 if armed != self.armed:
                     self.disarmed_at = math.inf if armed else now
                 self.heartbeat, self._beat_at = message, now
                 if self.wanted is not None and self.wanted.custom_mode != message.custom_mode:
                     self.wanted = None
-            case CurrentMode():
-                self._needed[CURRENT_MODE], self.wanted = now, message
+            case messages.CurrentMode():
+                self._needed[protocol.CURRENT_MODE], self.wanted = now, message
                 if self.heartbeat is not None:
                     self.heartbeat = replace(self.heartbeat, custom_mode=message.custom_mode)
-            case GlobalPositionInt():
+            case messages.GlobalPositionInt():
                 self._on_position(message, now)
-            case SysStatus():
-                self._needed[SYSTEM_STATUS], self.status = now, message
-            case LocalPositionNed():
-                self._needed[LOCAL_POSITION], self.knows_place = now, True
-            case MissionCurrent():
-                self._needed[CURRENT_ITEM] = now
+            case messages.SysStatus():
+                self._needed[protocol.SYSTEM_STATUS], self.status = now, message
+            case messages.LocalPositionNed():
+                self._needed[protocol.LOCAL_POSITION], self.knows_place = now, True
+            case messages.MissionCurrent():
+                self._needed[protocol.CURRENT_ITEM] = now
                 known, self.current = self.current or message, message
                 same = (message.total, message.mission_id) == (known.total, known.mission_id)
                 if self._rows and not (same and message.total in (0, self.items)):
                     self._end("changed", "the vehicle's mission is another one now than the file's")
-            case MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
+            case messages.MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
                 rows = (*self._rows[:seq], item, *self._rows[seq + 1 :])
                 held = self._home <= seq < len(self._rows)
                 found = compare(self._rows, rows, MissionType.MISSION, self.vehicle) if held else ()
                 for wrong in (each for each in found if each.kind == "wrong"):
                     self._end("changed", f"the vehicle's mission is another one now: {wrong}")
-            case Statustext(severity=severity, text=text) if severity <= MavSeverity.WARNING:
+            case messages.Statustext(severity=severity, text=text) if severity <= _WARNING:
                 self.said.append(text.strip())
                 self.told.append(f"the vehicle says: {text.strip()}")
 
     def tick(self, now: float) -> list[Message]:
         """Take note of the time, and return what to ask the vehicle."""
-        quiet = now - self.heard_at
+        quiet, out = now - self.heard_at, list[Message]()
         if quiet >= self.patience:
             self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
         elif quiet >= _SILENT and not self._is_silent:
             self._is_silent = True
             self.told.append(f"nothing heard for {quiet:.0f} s")
-        out: list[Message] = []
         for kind, period in self._periods.items():
             if now - self._needed[kind] >= _MISSED:
                 self._needed[kind] = now
                 ask = (MavCommand.SET_INTERVAL, 0, float(kind), period * 1e6)
-                out.append(CommandLong(self._peer.address, *ask))
+                out.append(messages.CommandLong(self._peer.address, *ask))
         # ArduPilot has no number for its mission, and answers each request by itself: its mission
         # is read again item by item, which disturbs nobody.
         reads = self._peer.manners.any_request_order and self._rows
         if reads and now >= self._next_reading:
-            self._next_reading = now + _READ_AGAIN
-            out.append(MissionRequestInt(self._peer.address, MissionType.MISSION, self._next_item))
-            beyond = self._next_item + 1
-            self._next_item = beyond if beyond < len(self._rows) else self._home
+            self._next_reading, seq = now + _READ_AGAIN, self._next_item
+            out.append(messages.MissionRequestInt(self._peer.address, MissionType.MISSION, seq))
+            self._next_item = seq + 1 if seq + 1 < len(self._rows) else self._home
         return out
 
-    def _on_position(self, message: GlobalPositionInt, now: float) -> None:
+    def _on_position(self, message: messages.GlobalPositionInt, now: float) -> None:
         t = message.time_boot_ms
         last = 1000 * self.fixes[-1].t if self.fixes else -1.0
         if t < last - _BACK:
             self._end("rebooted", "the vehicle has rebooted: what it flies now is not known")
         elif t > last and (place := place_in(message)) is not None:
             self.position, self.place, self._placed_at = message, place, now
-            if t < last + 1000 * _SLOW * self._periods[POSITION]:
-                self._needed[POSITION] = now
+            if t < last + 1000 * _SLOW * self._periods[protocol.POSITION]:
+                self._needed[protocol.POSITION] = now
             home = (message.alt - message.relative_alt) / 1000
             self.fixes.append(Fix(t / 1000, place.latitude, place.longitude, place.altitude, home))
 

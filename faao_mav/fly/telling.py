@@ -17,16 +17,9 @@ from faao_mav.fly.fly import FlightReport
 from faao_mav.fly.watch import BEFORE, Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.precoder_table import check_of_slots, taken_by
+from faao_mav.validate import flown
 from faao_mav.validate.comparison import predicted_line
-from faao_mav.validate.flown import (
-    Debriefing,
-    FlightRecord,
-    Line,
-    debriefing,
-    late,
-    plan_start,
-    standing,
-)
+from faao_mav.validate.flown import Debriefing, FlightRecord, Line
 from faao_mav.validate.rule import Finding, Level, by_rule, count_of, line_of
 from faao_mav.vector import lengths
 
@@ -73,7 +66,7 @@ class Radios:
             return None
         planned = now = 0.0 if t is None else t
         if t is None or taken_by(plan) == "place":
-            planned -= late(solution, now, w)
+            planned -= flown.late(solution, now, w)
         step = float(solution.t[1] - solution.t[0])
         slot = min(int(max(planned, 0.0) / step + 1e-9), len(solution.t) - 1)
         if slot == self._last:
@@ -143,7 +136,7 @@ class Telling:
 
     def __call__(self, watch: Watch) -> None:
         """Say what has happened since the last call, and once a second how the flight stands."""
-        seen, found, fixes = watch.seen, watch.findings, watch.seen.fixes
+        seen, found, fixes = watch.seen, watch.gate.findings, watch.seen.fixes
         if found is not None and found != self._found:
             self._found = found
             self._say({"note": findings_text(found), "findings": [asdict(each) for each in found]})
@@ -165,7 +158,7 @@ class Telling:
         """Return what became of the plan; None without one, or without its flight."""
         if self._solution is None or self._line is None or not len(report.record.t):
             return None
-        return debriefing(self._solution, self._line, report.record, report.relay_start)
+        return flown.debriefing(self._solution, self._line, report.record, report.relay_start)
 
     def _row(self, watch: Watch) -> dict[str, Any]:
         """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
@@ -191,10 +184,10 @@ class Telling:
             return None
         record, start = watch.seen.record(), watch.relay_start
         if start is None and not watch.streams:
-            self._start = start = plan_start(solution, self._line, record.line(solution))
+            self._start = start = flown.plan_start(solution, self._line, record.line(solution))
         if start is None:
             return None
-        stands = standing(solution, self._line, record.line(solution, start))
+        stands = flown.standing(solution, self._line, record.line(solution, start))
         if stands.over:
             return None
         told = asdict(stands)

@@ -1,21 +1,15 @@
 """Watching a flight from the ground to its end; arming and starting it, where that is asked for."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Held, Kind, Telemetry, read_held
-from faao_mav.validate.rule import Finding, Level
-from faao_mav.wire.machine import Machine, Script
-from faao_mav.wire.messages import (
-    CommandAck,
-    CommandLong,
-    Envelope,
-    Heartbeat,
-    Message,
-    MissionCurrent,
-)
+from faao_mav.fly.preflight import Clearance
+from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
+from faao_mav.wire import messages
+from faao_mav.wire.machine import Machine
+from faao_mav.wire.messages import CommandLong, Envelope, Message
 from faao_mav.wire.protocol import (
     LOCAL_POSITION,
     MISSION_COMPLETE,
@@ -23,15 +17,11 @@ from faao_mav.wire.protocol import (
     MissionType,
     command_result,
 )
-from faao_mav.wire.transfer import Peer
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",
     "ending", "aside",
 ]  # fmt: skip
-
-Preflight: TypeAlias = Callable[[Held, Telemetry], tuple[Finding, ...]]
-"""The gate before a flight: what stands against it, by what is held and seen of the vehicle."""
 
 _AGAIN, _TRIES = 1.5, 5
 """Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
@@ -51,12 +41,9 @@ was the mission that changed it. Chosen: three of the messages that tell the ite
 _FIRST_DO = 176
 """From this command on an item is no place to fly to or to wait at."""
 
-_LISTEN, _LOOK = 2.0, 5.0
+_LISTEN, _WORDS = 2.0, 1.0
 """Seconds of listening for other ground stations before anything is started: two heartbeats; and
-after which it is told what stands against a flight, though its place is not known. Chosen."""
-
-_WORDS = 1.0
-"""Seconds for which what the vehicle says of an arming that it denies is waited for; chosen."""
+for which what the vehicle says of an arming that it denies is waited for. Chosen."""
 
 BEFORE = "waiting", "checking", "engaging", "arming", "starting"
 """The phases before the flight, whose orders are given up after some tries."""
@@ -70,26 +57,25 @@ class Order:
     """
 
     command: MavCommand
-    params: tuple[float, ...]
-    due: float
+    params: tuple[float, ...] = ()
+    due: float = 0.0
     sent: int = 0
     refusals: int = 0
     answer: str = "does not answer"
 
 
 class Watch(Machine[Ending]):
-    """A machine that watches the vehicle of `peer` fly the mission that it `held` to its end.
+    """A machine that watches a vehicle fly the mission that it holds to its end.
 
-    `lands`: the flight ends on the ground. After `PATIENCE` seconds without a message it ends.
-    `seen` is what it has heard; it asks for `rate` positions a second. `findings` is what stands
-    against the flight: what `preflight`, the gate before it, has found last until it begins, None
-    before it has looked; a flight that begins elsewhere may be without.
+    `gate` says which vehicle, and what stands against the flight until it begins. `lands`: it ends
+    on the ground. After `PATIENCE` seconds without a message it ends. `seen` is what it has heard;
+    it asks for `rate` positions a second.
 
     With `arm` it arms the vehicle and starts the mission: once the autopilot's own checks pass, it
     knows where it is, no other ground station was heard, what it holds has been read again and the
-    gate finds no error. After `PATIENCE` seconds of checks that do not pass it ends. Nothing is
-    ever sent again, but what asks for telemetry, once the mode is one that was not asked for: then
-    the pilot, or a failsafe, has the aircraft. Without `arm` nothing else is sent at all.
+    gate is clear. After `PATIENCE` seconds of checks that do not pass it ends. Nothing is ever sent
+    again, but what asks for telemetry, once the mode is one that was not asked for: then the pilot,
+    or a failsafe, has the aircraft. Without `arm` nothing else is sent at all.
 
     `cancel` asks a flight that was started here to hold, and again until it does or a pilot has it,
     however long the link is silent; a second time it leaves it, as any other flight. `hang_up`
@@ -107,27 +93,15 @@ class Watch(Machine[Ending]):
     """Whether it is not the mission that is flown, but a plan by setpoints."""
 
     def __init__(
-        self,
-        peer: Peer,
-        held: Held,
-        preflight: Preflight | None,
-        *,
-        arm: bool = False,
-        lands: bool = True,
-        rate: float = POSITION_RATE,
+        self, gate: Clearance, *, arm: bool = False, lands: bool = True, rate: float = POSITION_RATE
     ) -> None:
         super().__init__()
-        assert peer.vehicle is not None
-        assert preflight is not None or not arm
-        self._peer, self._modes, self._family = peer, peer.vehicle.modes, peer.vehicle.family
-        rows = () if self.streams else held.lists[MissionType.MISSION]
+        self.gate, self._peer, self._arms, self._lands = gate, gate.peer, arm, lands
+        rows = () if self.streams else gate.held.lists[MissionType.MISSION]
         places = [n for n, row in enumerate(rows) if row.command < _FIRST_DO]
         self._last = max(places, default=len(rows) - 1)
-        self._arms, self._lands, self._held, self._preflight = arm, lands, held, preflight
-        self.findings: tuple[Finding, ...] | None = None
-        self._judged: tuple[object, ...] = ()
-        self._reading: Script[Held] | None = None
-        self.seen = Telemetry(peer, rows, rate)
+        self.seen = Telemetry(self._peer, rows, rate)
+        self._modes, self._family = self.seen.vehicle.modes, self.seen.vehicle.family
         if arm:
             self.seen.ask_for(LOCAL_POSITION, 1.0)
         self.phase: Phase = "checking" if arm else "waiting"
@@ -135,9 +109,9 @@ class Watch(Machine[Ending]):
         """When the plan's clock read 0, s on the vehicle's, where that is known."""
         self._flown = self._modes.mission
         """The mode that flies it."""
-        self._left: list[tuple[Phase, MavCommand, tuple[float, ...]]] = [
-            ("arming", MavCommand.ARM, (1.0,)),
-            ("starting", MavCommand.START, ()),
+        self._left: list[tuple[Phase, Order]] = [
+            ("arming", Order(MavCommand.ARM, (1.0,))),
+            ("starting", Order(MavCommand.START)),
         ]
         """The orders that are left to start it, one after the other."""
         self._order: Order | None = None
@@ -170,7 +144,7 @@ class Watch(Machine[Ending]):
             holds = self.phase != "holding" or not asked
             doubt = "" if holds else ", and has not confirmed that it holds"
             self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}{doubt}")
-            self._out += () if self._reading is None else self._reading.cancel(now)
+            self._out += () if self.gate.reading is None else self.gate.reading.cancel(now)
         return self._said()
 
     def hang_up(self, now: float) -> Sequence[Message]:
@@ -191,7 +165,7 @@ class Watch(Machine[Ending]):
         self.seen.hear(envelope, now)
         self._end_as_heard(now)
         if envelope.sender == self._peer.address and self.outcome is None:
-            self._out += () if self._reading is None else self._reading.on(envelope, now)
+            self._out += () if self.gate.reading is None else self.gate.reading.on(envelope, now)
             self._hear(envelope.message, now)
         return self._said()
 
@@ -205,23 +179,21 @@ class Watch(Machine[Ending]):
         return said
 
     def _hear(self, message: Message, now: float) -> None:
-        """Take note of what the vehicle tells."""
         order = self._order
         match message:
-            case CommandAck(target, command, result) if self._peer.own.takes(target):
+            case messages.CommandAck(target, command, result) if self._peer.own.takes(target):
                 if order is not None and command == order.command and result != _IN_PROGRESS:
                     self._answered(order, result, now)
-            case Heartbeat(armed=armed, custom_mode=mode):
+            case messages.Heartbeat(armed=armed, custom_mode=mode):
                 # A first heartbeat may be from before the order.
                 told = self.seen.disarmed_at == now or (order is not None and order.sent > 1)
                 if self.phase == "disarming" and told and not armed:
                     self._end(self._then.kind, f"{self._then.text}; it is disarmed{self._words}")
                 self._on_mode(mode, now)
-            case MissionCurrent() if not self.streams:
+            case messages.MissionCurrent() if not self.streams:
                 self._on_current(message, now)
 
     def _look(self, now: float) -> None:
-        """Do what is due."""
         self._out += self.seen.tick(now)
         self._end_as_heard(now)
         if now >= self.seen.disarmed_at + _REBOOT:
@@ -233,7 +205,7 @@ class Watch(Machine[Ending]):
         if self.outcome is not None:
             return
         if self.phase == "checking" or (self.phase == "waiting" and not self.seen.armed):
-            self._judge(now)
+            self.gate.judge(self.seen, now)
         if self.phase == "checking":
             self._check(now)
         else:
@@ -241,7 +213,7 @@ class Watch(Machine[Ending]):
 
     # ---- what the vehicle does
 
-    def _on_current(self, current: MissionCurrent, now: float) -> None:
+    def _on_current(self, current: messages.MissionCurrent, now: float) -> None:
         if self.phase in ("flying", "holding", "ending"):
             self._furthest = max(self._furthest, current.seq)
         late_news = self.phase == "aside" and now < self._aside_since + _LATE_NEWS
@@ -320,7 +292,6 @@ class Watch(Machine[Ending]):
             self._end("finished", f"the mission is over; the vehicle is in mode {self.seen.mode}")
 
     def _step_aside(self) -> None:
-        """Send nothing more."""
         if self.phase == "disarming":
             self._leave_armed(f"the pilot or a failsafe has it, in mode {self.seen.mode}")
         self.phase, self._order, self._path, self.seen.patience = "aside", None, (), PATIENCE
@@ -332,22 +303,19 @@ class Watch(Machine[Ending]):
     def _check(self, now: float) -> None:
         """Arm, if there is nothing against it, also by what it holds now and by fresh news."""
         seen, lacks, waited = self.seen, self._lacks(now), now - self.seen.begun
-        self._passes()
+        self.outcome = self.gate.refusal()
         if waited >= PATIENCE:
             said = "; ".join(dict.fromkeys(seen.said)) or lacks or "it does not say why"
             self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
         may_arm = seen.status is not None and seen.status.may_arm and seen.current is not None
         if self.outcome is not None or waited < _LISTEN or lacks or not may_arm:
             return
-        if self._reading is None:
-            self._reading = Script(read_held(self._peer))
-            self._out += self._reading.start(now)
-        elif self._reading.outcome is None:
-            self._out += self._reading.tick(now)
-        elif seen.is_fresh(now):
-            self._held = self._reading.outcome
-            self._judge(now, again=True)
-            if self._passes():
+        asks = self.gate.read_again(now)
+        self._out += asks or ()
+        if asks is None and seen.is_fresh(now):
+            self.gate.judge(seen, now, again=True)
+            self.outcome = self.gate.refusal()
+            if self.gate.is_clear:
                 orders = f"arming, and starting {seen.items} items"
                 orders = "it is set to follow setpoints, then armed" if self.streams else orders
                 seen.told.append(f"its own checks pass: {orders}")
@@ -357,53 +325,29 @@ class Watch(Machine[Ending]):
         """Return what it does not know that it has to, in words."""
         return "" if self.seen.knows_place else "it does not know where it is"
 
-    def _judge(self, now: float, *, again: bool = False) -> None:
-        """Ask the gate, once enough is heard, and `again` or when that is another state."""
-        seen = self.seen
-        known = seen.place is not None and seen.status is not None
-        heard = seen.heartbeat is not None and (known or now >= seen.begun + _LOOK)
-        others = len(seen.stations), len(seen.strangers)
-        state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
-        if self._preflight is not None and heard and (again or state != self._judged):
-            self._judged, self.findings = state, self._preflight(self._held, seen)
-
-    def _passes(self) -> bool:
-        """Tell whether the gate has found no error, and end where it has.
-
-        A place that is not known is waited for.
-        """
-        errors = [each for each in self.findings or () if each.level is Level.ERROR]
-        stops = [each for each in errors if each.rule != "position-unknown"]
-        if stops:
-            contested = any(each.rule == "ground-station" for each in stops)
-            told = "; ".join(f"{each.message} ({each.action})" for each in stops)
-            self._end("contested" if contested else "refused", f"nothing was started: {told}")
-        return self.findings is not None and not errors
-
     def _go_on(self, now: float) -> None:
         """Give the next of the orders that start it; after the last one it has begun."""
         if not self._left:
             self._begin()
             return
-        self.phase, command, params = self._left.pop(0)
+        self.phase, order = self._left.pop(0)
         mode = self.seen.custom_mode
         self._path = (mode,) if self.phase == "arming" else (mode, self._flown)
-        self._command(now, command, *params)
+        self._give(order, now)
 
     def _ask_to_hold(self, now: float) -> None:
-        """Ask the vehicle to hold, until it does."""
         hold = self._modes.hold
         self._path = self._path if self._path[-1:] == (hold,) else (*self._path, hold)
-        self._set_mode(now, hold)  # the phase last: an interrupt between finds the order
+        self._give(self._to_set(hold), now)  # the phase last: an interrupt between finds the order
         self.phase, self.seen.patience = "holding", math.inf
         self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
 
-    def _set_mode(self, now: float, mode: int) -> None:
-        self._command(now, MavCommand.SET_MODE, *self._family.mode_parameters(mode))
+    def _to_set(self, mode: int) -> Order:
+        return Order(MavCommand.SET_MODE, self._family.mode_parameters(mode))
 
-    def _command(self, now: float, command: MavCommand, *params: float) -> None:
+    def _give(self, order: Order, now: float) -> None:
         """Give an order, and repeat it until it is answered."""
-        self._order = Order(command, params, now)
+        self._order = order
         self.seen.said.clear()
         self._repeat(now)
 
@@ -442,7 +386,7 @@ class Watch(Machine[Ending]):
         """Have it disarm, and end with `then`."""
         self._then, self._path = then, (self.seen.custom_mode, self._flown)
         # The order first: an interrupt between finds it, not the one to arm.
-        self._order = Order(MavCommand.ARM, (0.0,), now)
+        self._order = Order(MavCommand.ARM, (0.0,))
         self.phase = "disarming"
         self.seen.told.append(f"{then.text}: it is asked to disarm")
         self._repeat(now)

@@ -1,4 +1,4 @@
-"""How a mock autopilot flies: what its mode, its mission, its fence and setpoints have it do.
+"""How a mock autopilot flies: what its mode, mission, fence and setpoints have its aircraft do.
 
 Measured in simulation. At the fence, at 8 m/s: ArduCopter 4.7 (FENCE_ENABLE 1, FENCE_ACTION 1)
 changed to RTL 1 m outside, went home and landed; PX4 1.16.1 (GF_ACTION 2) changed to hold 4 m
@@ -11,9 +11,10 @@ take-off.
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle, VehicleType
@@ -25,11 +26,117 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.item import Home, Mission
-from faao_mav.sim.follower import Follower
 from faao_mav.wire.messages import SetPositionTargetLocalNed
 
 _FARTHEST = 1e6
 """Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen."""
+
+_STEP, _LONGEST = 0.05, 60.0
+"""Seconds between two steps towards a setpoint, and the longest that is flown at once: after a
+longer silence it flies on from there. Chosen."""
+
+_STIFFNESS = 1.5
+"""Of how it corrects an error, 1/s, damped critically; chosen: as slow as those simulated."""
+
+_PUSH = 5.0
+"""The greatest acceleration towards a setpoint, m/s²; chosen: a lean of 27 degrees."""
+
+_GROUND = 0.5
+"""Metres above home below which it stands on the ground; chosen."""
+
+
+class Posture(NamedTuple):
+    """Position, m, and velocity, m/s, (3,) east, north, up of home; and the mission's item."""
+
+    position: Real
+    velocity: Real
+    item: int
+
+
+class Follower:
+    """An aircraft that stands at home until it is sent along places, or towards a setpoint.
+
+    `wind`, m/s east and north, is what it flies in: towards setpoints it is no faster than its
+    airspeed. `aim` is the setpoint, None along places. Times are seconds on a clock of its own.
+    """
+
+    def __init__(self, wind: tuple[float, float]) -> None:
+        self._wind = np.array([*wind, 0.0])
+        self.stand()
+
+    def stand(self) -> None:
+        """Stand at home, whatever it did."""
+        self._time, self._p, self._v, self._item = 0.0, np.zeros(3), np.zeros(3), 0
+        self.play(np.zeros(1), np.zeros((1, 3)), np.zeros(1, dtype=int))
+
+    def play(self, t: Real, places: Real, items: NDArray[np.int_]) -> None:
+        """Be at `places` (k, 3), m, at the times `t` (k,), s, on the way to `items` (k,)."""
+        self._t, self._places, self._items = t, places, items
+        self.aim: Real | None = None
+
+    def go(self, now: float, *legs: tuple[Real, float]) -> None:
+        """Fly from where it is straight to one place after another, each at a speed, m/s.
+
+        Without `legs` it stays where it is, and never arrives.
+        """
+        points, times = [self.at(now).position], [now if legs else math.inf]
+        for place, speed in legs:
+            points.append(place)
+            times.append(times[-1] + float(np.linalg.norm(points[-1] - points[-2])) / speed)
+        self.play(np.array(times), np.array(points), np.full(len(points), self._item))
+
+    def pursue(self, now: float, aim: Real, airspeed: float, *, carries_on: bool) -> None:
+        """Fly to `aim` at up to `airspeed`, m/s, or to where it is by then if it `carries_on`.
+
+        It is (3, 3): position, m, velocity, m/s, and acceleration, m/s².
+        """
+        self.at(now)
+        self.aim, self._since, self._airspeed, self._carries_on = aim, now, airspeed, carries_on
+
+    @property
+    def arrives(self) -> float:
+        """When it comes to the last place, s; inf towards a setpoint."""
+        return math.inf if self.aim is not None else float(self._t[-1])
+
+    def flies(self, now: float) -> bool:
+        """Tell whether it is above the ground."""
+        return bool(self.at(now).position[2] >= _GROUND)
+
+    def landed(self, now: float) -> bool:
+        """Tell whether it has come to a last place that is on the ground."""
+        return now >= self.arrives and not self.flies(now)
+
+    def at(self, now: float) -> Posture:
+        """Return where it is, and how it moves."""
+        if self.aim is None:
+            self._play_until(now)
+        else:
+            self._time = max(self._time, now - _LONGEST)
+            while self._time < now:
+                self._step_to(self.aim, min(_STEP, now - self._time))
+        return Posture(self._p, self._v, self._item)
+
+    def _play_until(self, now: float) -> None:
+        k = max(int(np.searchsorted(self._t, now, side="right")) - 1, 0)
+        self._time, self._item = now, int(self._items[k])
+        self._p, self._v = self._places[k], np.zeros(3)
+        if self._t[k] <= now and k + 1 < len(self._t):
+            self._v = (self._places[k + 1] - self._p) / (self._t[k + 1] - self._t[k])
+            self._p = self._p + self._v * (now - self._t[k])
+
+    def _step_to(self, aim: Real, step: float) -> None:
+        self._time += step
+        p, v, a = aim
+        if self._carries_on:
+            since = self._time - self._since
+            p, v = p + v * since + a * since**2 / 2, v + a * since
+        a = a + 2 * _STIFFNESS * (v - self._v) + _STIFFNESS**2 * (p - self._p)
+        a = a * min(1.0, _PUSH / max(float(np.linalg.norm(a)), 1e-9))
+        through_air = self._v + a * step - self._wind
+        through_air *= min(1.0, self._airspeed / max(float(np.linalg.norm(through_air)), 1e-9))
+        before, self._v = self._v, through_air + self._wind
+        self._p = self._p + (before + self._v) / 2 * step
+        self._p[2] = max(self._p[2], 0.0)
 
 
 class Flight:
@@ -71,7 +178,7 @@ class Flight:
 
     def land(self) -> None:
         """Turn the motors off where it stands."""
-        self.armed = self.on_mission = self._follows = False
+        self.armed = self.on_mission = False
         self._track: Track | None = None
 
     def arm(self, now: float) -> None:
@@ -98,7 +205,7 @@ class Flight:
         """
         if self.on_mission:
             self._since = now - self._begun
-        self._follows = self.on_mission = False
+        self.on_mission = False
         vehicle, (east, north, up) = self.vehicle, self.aircraft.at(now).position
         legs = list[tuple[Real, float]]()
         if not self.aircraft.flies(now) or action == "hold":
@@ -141,7 +248,7 @@ class Flight:
         times, items = np.append(now, track.t[k:] + self._begun), track.item[k:]
         places = np.vstack([here, track.position[k:]])
         self.aircraft.play(times, places, np.append(items[0], items))
-        self._follows, self.on_mission = False, True
+        self.on_mission = True
         return True
 
     def leaves_fence(self, now: float) -> bool:
@@ -185,7 +292,7 @@ class Flight:
         flies = self.rules.takes_off_by_setpoints or self.aircraft.flies(now)
         aim = self.aim(message)
         if guided and flies and (np.abs(aim) < _FARTHEST).all():
-            self._follows, carries_on = True, self.rules.carries_on
+            carries_on = self.rules.carries_on
             self.aircraft.pursue(now, aim, self.vehicle.top_airspeed, carries_on=carries_on)
         return comes_back
 
@@ -200,7 +307,7 @@ class Flight:
 
     def lose_setpoints(self, now: float) -> None:
         """Do what is to be done when setpoints have ceased, if they have."""
-        if not self._follows or not self._late(now):
+        if self.aircraft.aim is None or not self._late(now):
             return
         by_sticks = False
         if self.rules.loss:

@@ -13,8 +13,7 @@ from faao_mav.mission.command import Command
 from faao_mav.mission.item import Home, Mission
 from faao_mav.sim.behaviour import Behaviour, whole
 from faao_mav.sim.flight import Flight
-from faao_mav.sim.lists import StoredLists
-from faao_mav.sim.parameter_protocol import ParameterServer
+from faao_mav.sim.storage import ParameterServer, StoredLists
 from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext
@@ -124,11 +123,8 @@ class MockAutopilot(Machine[None]):
         """The time on its own clock, s since it booted."""
         return (self._now - self._booted) * self._speedup
 
-    def _is_ready(self) -> bool:
-        return self._now >= self._booted + self._boot
-
-    def _knows_place(self) -> bool:
-        return self._now >= self._booted + self._boot + self._place
+    def _is_ready(self, more: float = 0.0) -> bool:
+        return self._now >= self._booted + self._boot + more
 
     def _time_out(self, now: float) -> Sequence[Message]:
         late = now - self.deadline
@@ -140,10 +136,10 @@ class MockAutopilot(Machine[None]):
             out += self._follow()
         if now >= self._next_beat:
             self._next_beat = now + self._beat
-            out += [self._heartbeat(), self._mission_current()]
             passes = protocol.PREARM_CHECK * self._is_ready()
-            out.append(messages.SysStatus(passes, 12_600, self._battery))
-            out.append(messages.BatteryStatus(0, 1, self._battery))
+            status = messages.SysStatus(passes, 12_600, self._battery)
+            battery = messages.BatteryStatus(0, 1, self._battery)
+            out += [self._heartbeat(), self._mission_current(), status, battery]
             out += [self._modes()] * self._tells_asked_mode
         if now >= self._next_report:
             self._next_report = now + self._period
@@ -171,7 +167,7 @@ class MockAutopilot(Machine[None]):
             _fitted(-100 * v_up, 16),
             round(math.degrees(heading) % 360 * 100) % 36_000,
         )
-        if not self._knows_place():
+        if not self._is_ready(self._place):
             return [replace(place, lat=0, lon=0, alt=0)] if self.behaviour.tells_no_place else []
         local = messages.LocalPositionNed(time, north, east, -up, v_north, v_east, -v_up)
         return [place, local, messages.Attitude(time, heading)]
@@ -228,10 +224,9 @@ class MockAutopilot(Machine[None]):
                 target = message.target
             case _:
                 return ()
-        own = self.address
         # PX4 takes for its own what is sent to its mission planner.
-        as_planner = Address(own.system, protocol.GROUND_STATION.component)
-        if sender == own or not (own.takes(target) or as_planner.takes(target)):
+        planner = Address(self.address.system, protocol.GROUND_STATION.component)
+        if sender == self.address or not (self.address.takes(target) or planner.takes(target)):
             return ()
         match message:
             case CommandLong(command=command):
@@ -254,15 +249,14 @@ class MockAutopilot(Machine[None]):
         match command.command:
             case MavCommand.ARM:
                 result = self._arm(command.param1 >= 0.5)
-                why = self._why_not_armed() if result == self.behaviour.denied else None
-                if why is not None:
+                if result == self.behaviour.denied and (why := self._why_not_armed()):
                     answers.append(Statustext(MavSeverity.CRITICAL, f"Arm: {why}"))
                 return result
             case MavCommand.TAKEOFF:
                 climbs = self.flight.take_off(command.param7, self._clock)
                 return _ACCEPTED if climbs else _DENIED
             case MavCommand.START:
-                if not self._knows_place():
+                if not self._is_ready(self._place):
                     return _FAILED
                 self.flight.enter(self.flight.modes.mission, self._clock)
                 return self._begin()
@@ -310,14 +304,14 @@ class MockAutopilot(Machine[None]):
         if not wanted:
             self.flight.stop()
             return _ACCEPTED
-        if self._why_not_armed() is not None:
+        if self._why_not_armed():
             return self.behaviour.denied
         if not self.armed:
             self.flight.arm(self._clock)
         return self._begin() if self.mode == self.flight.modes.mission else _ACCEPTED
 
-    def _why_not_armed(self) -> str | None:
-        """Return what it says when it does not arm, None if it does."""
+    def _why_not_armed(self) -> str:
+        """Return what it says when it does not arm, "" if it does."""
         if not self._is_ready():
             return "Calibrating"
         if self.mode in self.flight.modes.not_to_arm_in:
@@ -325,9 +319,9 @@ class MockAutopilot(Machine[None]):
         try:
             fence = self.mission().fence
         except InputError:  # peers store what they like
-            return None
+            return ""
         outside = self.behaviour.armed_inside_only and self.flight.is_outside(fence, np.zeros(3))
-        return "Vehicle breaching Polygon fence" if outside else None
+        return "Vehicle breaching Polygon fence" if outside else ""
 
     def _set_mode(self, mode: int) -> int:
         modes, clock = self.flight.modes, self._clock

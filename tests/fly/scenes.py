@@ -1,20 +1,22 @@
 """A mock autopilot and a watch of it, on a simulated link."""
 
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
+from itertools import pairwise
 from typing import Any, TypeAlias, cast
 
 import numpy as np
 from conftest import FLYABLE, edited
-from simple_flight import fly
 from simulate import Station, simulate
 from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
+from faao_mav.autopilot import Track, Vehicle
 from faao_mav.fly.itinerary import LEVEL, NEAR
-from faao_mav.fly.preflight import Flight, preflight
+from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import Held
 from faao_mav.fly.watch import Watch
@@ -24,29 +26,11 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
+from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
-from faao_mav.wire.messages import (
-    CommandLong,
-    Envelope,
-    GlobalPositionInt,
-    Heartbeat,
-    Message,
-    MissionAck,
-    MissionRequestInt,
-    MissionRequestList,
-    ParamRequestRead,
-    SetMode,
-    SetPositionTargetLocalNed,
-    Timesync,
-)
+from faao_mav.wire.messages import CommandLong, Envelope, Heartbeat, Message
 from faao_mav.wire.parameters import Reading
-from faao_mav.wire.protocol import (
-    GROUND_STATION,
-    GROUND_STATION_TYPE,
-    NO_AUTOPILOT,
-    MavCommand,
-    MissionType,
-)
+from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
 
 METRE = 1e7 / 111_319.5
@@ -121,6 +105,30 @@ def away(metres: float, higher: float = 0.0) -> Home:
     return Home(float(latitude), float(longitude), HOME.altitude + higher)
 
 
+def fly(mission: Mission, _: Vehicle | None = None) -> Track:
+    """Return a flight from home over all places at 10 m/s; landing where it started."""
+    assert mission.home is not None
+    frame = LocalFrame(mission.home.latitude, mission.home.longitude)
+    points, items = [np.zeros(3)], [0]
+    for index, item in enumerate(mission.items):
+        if item.command in (20, 21):
+            points += [points[0] + [0, 0, points[-1][2]], points[0]]
+            items += [index, index]
+        elif item.frame == 3 or item.frame == 6:
+            points.append(np.append(frame.to_local(item.x, item.y), item.z))
+            items.append(index)
+    legs = [np.linalg.norm(b - a) / 10.0 for a, b in pairwise(points)]
+    times = np.concatenate([[0.0], np.cumsum(legs)])
+    t = np.linspace(0.0, times[-1], int(times[-1] * 10) + 2)
+    position = np.column_stack([np.interp(t, times, np.array(points)[:, k]) for k in range(3)])
+    velocity = np.gradient(position, t, axis=0)
+    following = np.searchsorted(times[1:], t, side="left").clip(max=len(legs) - 1)
+    reached = np.full(len(mission.items), math.nan)
+    for index, time in zip(items[1:], times[1:], strict=True):
+        reached[index] = time
+    return Track(t, position, velocity, np.array(items[1:])[following], reached, frame)
+
+
 def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
     """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
     values = mock.parameters.values.items()
@@ -129,12 +137,17 @@ def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
     return Held(lists, Reading(told), home=mock.home)
 
 
+Heard: TypeAlias = Callable[[Any, float], object]
+Lens: TypeAlias = Callable[[Message, float], Sequence[Message]]
+
+
 class Scene:
     """A mock autopilot that holds a mission, and a watch of it on a simulated link.
 
     `flight` is what is asked for beside that mission, for which the mock may not be ready. With a
     `solution` it is flown by setpoints: `times`, s, are when the flying mock was sent one, `sent`
-    where to and `places` where it was, m.
+    where to and `places` where it was, m. `events` happen at their times, with `others` on the
+    link, which has `faults`.
     """
 
     def __init__(
@@ -142,6 +155,7 @@ class Scene:
         kind: str,
         mission: Mission | None = None,
         *,
+        arm: bool = False,
         lands: bool = True,
         solution: Solution | None = None,
         flight: Flight | None = None,
@@ -149,30 +163,28 @@ class Scene:
         untimed: bool = False,
         **options: Any,
     ) -> None:
-        self.arm = bool(options.pop("arm", False))
         mission = mission or a_mission(12)
-        behaviour = behaviour_of(cast(MockKind, kind))
         if solution is not None:
-            options["parameters"] = {"GUID_TIMEOUT": 1.0} | dict(options.get("parameters") or {})
+            options["parameters"] = {"GUID_TIMEOUT": 1.0, **options.get("parameters", {})}
+        behaviour = behaviour_of(cast(MockKind, kind))
         self.mock: Any = MockAutopilot(behaviour, **{"home": HOME, **options})
         self.mock.flight._fly = fly
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        held, peer = held_by(self.mock), peer_of(kind)
-        gate = partial(preflight, flight, elsewhere=elsewhere, untimed=untimed)
-        self.watch: Any = Watch(peer, held, gate, arm=self.arm, lands=lands)
-        if solution is not None:
-            self.watch = Stream(peer, solution, held, gate)
-        self.client = Counted(self.watch)
-        self.solution = solution
+        allowed = {"elsewhere": elsewhere, "untimed": untimed}
+        gate = Clearance(flight, peer_of(kind), held_by(self.mock), **allowed)
+        self.watch: Any = Stream(gate) if solution else Watch(gate, arm=arm, lands=lands)
+        self.client, self.solution = Counted(self.watch), solution
         self.times, self.sent, self.places = list[float](), list[Real](), list[Real]()
+        self.events, self.others = list[tuple[float, Any]](), list[Station]()
+        self.faults, self.until = Faults(), 300.0
         self._record()
 
     def _record(self) -> None:
         hear = self.mock.flight.hear
 
-        def heard(message: SetPositionTargetLocalNed, now: float) -> bool:
+        def heard(message: messages.SetPositionTargetLocalNed, now: float) -> bool:
             flight = self.mock.flight
             if flight.armed:
                 self.times.append(now)
@@ -182,39 +194,32 @@ class Scene:
 
         self.mock.flight.hear = heard
 
-    @property
-    def off(self) -> Real:
-        """How far it was sent each time, (k, 3) m."""
-        return np.array(self.sent) - np.array(self.places)
-
     def assert_gated(self, lag: float = 0.0) -> None:
         """Check that it was never sent farther than the gate lets it, and within its fence.
 
         `lag` is how far it flies, m, while a position and its answer are on the link.
         """
         assert self.solution is not None
-        across, area = np.hypot(*self.off[:, :2].T), self.solution.plan.keep_in
+        off, area = np.array(self.sent) - np.array(self.places), self.solution.plan.keep_in
+        across = np.hypot(*off[:, :2].T)
         assert across.max() <= CAP + lag
-        assert np.abs(self.off[:, 2]).max() <= LEVEL + 2.0 + lag
+        assert np.abs(off[:, 2]).max() <= LEVEL + 2.0 + lag
         for place, to, far in zip(self.places, self.sent, across, strict=True):
             if area is not None and far > NEAR + lag:
                 assert area.covers_path(np.array([place[:2], to[:2]]))
-
-    def assert_arrived(self) -> None:
-        """Check that it has flown to the end of its plan."""
-        assert self.solution is not None
-        last = self.watch.seen.record().line(self.solution).w[-1]
-        assert np.linalg.norm(last - self.solution.w[-1]) < 1.0
 
     def after(self, begin: float, end: float = float("inf")) -> int:
         """Return how many setpoints it was sent after `begin`, s, and before `end`."""
         return sum(begin < each < end for each in self.times)
 
-    def run(self, faults: Faults | None = None, until: float = 300.0, **more: Any) -> str:
-        """Return the kind of the ending, "" for none."""
-        stations = Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)
-        simulate(*stations, faults, until, **more)
-        return self.watch.outcome.kind if self.watch.outcome is not None else ""
+    def run(self, looks: Sequence[tuple[float, Callable[[float], object]]] = ()) -> str:
+        """Return the kind of the ending, "-" for none; `looks` are called at their times."""
+        stations, events = (
+            (Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)),
+            [*self.events, *looks],
+        )
+        simulate(*stations, self.faults, self.until, events=events, others=self.others)
+        return self.watch.outcome.kind if self.watch.outcome is not None else "-"
 
     @property
     def orders(self) -> list[Message]:
@@ -228,9 +233,9 @@ class Scene:
 
     def sets(self, mode: int) -> Any:
         """Return an event: the pilot sets a mode."""
-        return lambda now: self.mock.on(Envelope(FOREIGN, SetMode(1, 1, mode)), now)
+        return lambda now: self.mock.on(Envelope(FOREIGN, messages.SetMode(1, 1, mode)), now)
 
-    def tells(self, lens: Callable[[Message, float], Sequence[Message]]) -> None:
+    def tells(self, lens: Lens) -> None:
         """Let the vehicle send what `lens` makes of each of its messages, and the time."""
         tick, on = self.mock.tick, self.mock.on
 
@@ -240,7 +245,7 @@ class Scene:
         self.mock.tick = lambda now: through(tick(now), now)
         self.mock.on = lambda envelope, now: through(on(envelope, now), now)
 
-    def loses(self, when: Callable[[Any, float], object], *, heard: bool = False) -> None:
+    def loses(self, when: Heard, *, heard: bool = False) -> None:
         """Let what is sent to the vehicle be lost; or, where it is `heard`, its answers."""
         on = self.mock.on
 
@@ -257,7 +262,7 @@ class Scene:
 
     def hang_up(self, now: float) -> None:
         """Close the terminal; what is sent then is lost at first."""
-        self.client.sent += self.watch.hang_up(now)
+        self.client.hang_up(now)
 
     @property
     def commands(self) -> list[tuple[int, float]]:
@@ -269,48 +274,8 @@ class Scene:
         return any(words in text for text in self.watch.seen.told)
 
 
-def during(
-    begin: float, end: float, change: Callable[[GlobalPositionInt], GlobalPositionInt]
-) -> Callable[[Message, float], Sequence[Message]]:
-    """Return a lens that has positions of some time changed."""
-
-    def lens(message: Message, now: float) -> Sequence[Message]:
-        if isinstance(message, GlobalPositionInt) and begin <= now < end:
-            return [change(message)]
-        return [message]
-
-    return lens
-
-
 def is_setpoint(message: object) -> bool:
-    return isinstance(message, SetPositionTargetLocalNed)
-
-
-Change: TypeAlias = Callable[[GlobalPositionInt], GlobalPositionInt]
-
-
-def stuck() -> Change:
-    first: list[GlobalPositionInt] = []
-
-    def change(told: GlobalPositionInt) -> GlobalPositionInt:
-        first.append(told)
-        return replace(first[0], time_boot_ms=told.time_boot_ms)
-
-    return change
-
-
-def leap(seconds: float) -> Change:
-    by = round(1000 * seconds)
-    return lambda told: replace(told, time_boot_ms=max(told.time_boot_ms + by, 0))
-
-
-CHANGES: dict[str, Callable[..., Change]] = {
-    "jump": lambda metres: lambda told: replace(told, lat=told.lat + round(metres * METRE)),
-    "stuck": stuck,
-    "leap": leap,
-    "higher": lambda m: lambda told: replace(told, relative_alt=told.relative_alt - int(1000 * m)),
-}
-"""What becomes of positions: the place jumps or stands, the clock leaps, or home moves."""
+    return isinstance(message, messages.SetPositionTargetLocalNed)
 
 
 def arms(message: object, wanted: float | None = None) -> bool:
@@ -327,7 +292,13 @@ def starts(message: object) -> bool:
 def harmless(message: Message) -> bool:
     asked = (MavCommand.SET_INTERVAL, MavCommand.REQUEST_MESSAGE)
     asks = isinstance(message, CommandLong) and message.command in asked
-    reads = MissionRequestList | MissionRequestInt | MissionAck | ParamRequestRead | Timesync
+    reads = (
+        messages.MissionRequestList
+        | messages.MissionRequestInt
+        | messages.MissionAck
+        | messages.ParamRequestRead
+        | messages.Timesync
+    )
     return asks or isinstance(message, reads)
 
 
@@ -347,7 +318,7 @@ class AnotherStation(Machine[None]):
 
     def _time_out(self, now: float) -> Sequence[Message]:
         self._due = now + 1.0
-        return [Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, 0, 4)]
+        return [Heartbeat(protocol.GROUND_STATION_TYPE, protocol.NO_AUTOPILOT, 0, 0, 4)]
 
 
 class Companion(AnotherStation):
@@ -356,4 +327,4 @@ class Companion(AnotherStation):
     def _time_out(self, now: float) -> Sequence[Message]:
         self._due = now + 0.3
         ms, place = round(now * 1000) + 5000, (round(HOME.latitude * 1e7), round(1e9), 9000, 9000)
-        return [Heartbeat(18, 8, 0, LOITER, 4), GlobalPositionInt(ms, *place, 0, 0, 0, 0)]
+        return [Heartbeat(18, 8, 0, LOITER, 4), messages.GlobalPositionInt(ms, *place, 0, 0, 0, 0)]

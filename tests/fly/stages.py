@@ -1,17 +1,18 @@
 """A scene of the mock as a row of words sets it up: see `test_scenes.py` for the words."""
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
 
 from scenes import (
-    CHANGES,
+    METRE,
     AnotherStation,
     Companion,
+    Lens,
     Scene,
     arms,
     away,
-    during,
     is_setpoint,
     low,
     starts,
@@ -25,14 +26,8 @@ from stations import FOREIGN, HOME, RALLY, a_mission, rows_for, vehicle_of
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
-from faao_mav.wire.messages import (
-    CommandAck,
-    CommandLong,
-    Envelope,
-    GlobalPositionInt,
-    Message,
-    MissionCurrent,
-)
+from faao_mav.wire import messages
+from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
 
@@ -65,13 +60,14 @@ PLANS: dict[str, Callable[[], Solution]] = {
     "hovers": lambda: with_plan({"mission.on_finish": "hover"}),
     "away": lambda: with_plan({"site.origin.latitude": HOME.latitude + 0.001}),
 }
-PICKED: dict[str, Callable[[Message], bool]] = {
+Picks: TypeAlias = Callable[[Message], bool]
+PICKED: dict[str, Picks] = {
     "arm": lambda message: arms(message, 1.0),
     "disarm": lambda message: arms(message, 0.0),
     "start": starts,
     "setpoints": is_setpoint,
     "hold": lambda message: (
-        isinstance(message, CommandLong)
+        isinstance(message, messages.CommandLong)
         and message.command == MavCommand.SET_MODE
         and (message.param2, message.param3) in ((MODES["ardupilot"]["hold"], 0), (4, 3))
     ),
@@ -79,140 +75,147 @@ PICKED: dict[str, Callable[[Message], bool]] = {
 }
 
 
-class Stage:
-    """One scene, as it is set up."""
+def positions(change: Callable[..., messages.GlobalPositionInt]) -> Callable[..., Lens]:
+    """Return what makes a lens: positions of some time are changed, by numbers beside them."""
 
-    def __init__(self, flies: str, kind: str, given: dict[str, str], happens: str) -> None:
-        self.kind, self.modes = kind, MODES[kind]
-        self.events, self.others = list[tuple[float, Any]](), list[Station]()
-        numbers = {k: float(v) for k, v in given.items() if v and k != "home"}
-        options: dict[str, Any] = {k: v for k, v in numbers.items() if k in ("boot", "place")}
-        options |= {"battery": int(numbers["battery"])} if "battery" in numbers else {}
-        if "home" in given:
-            options["home"] = away(*map(float, given["home"].split(",")))
-        self.until = numbers.get("until", 300.0)
-        self.scene = Scene(
-            kind,
-            MISSIONS.get(flies),
-            solution=PLANS[flies]() if flies in PLANS else None,
-            arm=flies not in (*PLANS, "watch"),
-            lands=flies != "hovering",
-            elsewhere="elsewhere" in given,
-            parameters={name: value for name, value in numbers.items() if name.isupper()},
-            **options,
-        )
-        if "stays-armed" in given:
-            self.scene.mock.flight.aircraft.landed = lambda _: False
-        if "refuses" in given:
-            self._denies(starts, MavCommand.START)
-        silences = []
-        for when, *words in map(str.split, filter(None, happens.split("; "))):
-            begin, end = (float(each) for each in (when.split("-") * 2)[:2])
-            if words == ["silence"]:
-                silences.append((begin, end))
-            elif words[0] in ("loses", "mutes"):
-                self._loses(PICKED[words[1]], begin, end, heard=words[0] == "mutes")
-            elif words[0] in CHANGES:
-                changed = CHANGES[words[0]](*map(float, words[1:]))
-                self.scene.tells(during(begin, end, changed))
-            elif words == ["blind"]:
-                self._blinds(begin)
-            elif words == ["hold-up"]:
-                self._holds_up(begin, end)
-            elif words == ["lag"]:
-                self._lags()
-            elif words == ["unready"]:
-                self._denies(PICKED["arm"], MavCommand.ARM, end)
-            elif words[0] in ("station", "twin", "companion"):
-                address = {"station": FOREIGN, "companion": Address(1, 191)}.get(
-                    words[0], GROUND_STATION
-                )
-                other = Companion if words[0] == "companion" else AnotherStation
-                self.others.append(Station(other(begin), address))
-            else:
-                self.events.append((begin, self._event(*words)))
-        faults: dict[str, Any] = {k: v for k, v in numbers.items() if k in FAULTS}
-        seed = int(faults.pop("seed", 0))
-        self.faults = Faults(**faults, seed=seed, outages=tuple(silences))
+    def lens(begin: float, end: float, *numbers: float) -> Lens:
+        first: list[messages.GlobalPositionInt] = []
 
-    def _loses(
-        self, picked: Callable[[Message], bool], begin: float, end: float, *, heard: bool
-    ) -> None:
-        self.scene.loses(lambda said, now: picked(said) and begin <= now < end, heard=heard)
+        def told(said: Message, now: float) -> Sequence[Message]:
+            if not isinstance(said, messages.GlobalPositionInt) or not begin <= now < end:
+                return [said]
+            first.append(said)
+            return [change(said, first[0], *numbers)]
 
-    def _blinds(self, begin: float) -> None:
-        self.scene.tells(
-            lambda said, now: [said][isinstance(said, GlobalPositionInt) and now > begin :]
-        )
+        return told
 
-    def _holds_up(self, begin: float, end: float) -> None:
-        """Hold back all that the vehicle says, and then deliver it at once."""
-        held = list[Message]()
+    return lens
 
-        def bursts(said: Message, now: float) -> Sequence[Message]:
-            if begin <= now < end:
-                held.append(said)
-                return ()
-            out = [*held, said]
-            held.clear()
-            return out
 
-        self.scene.tells(bursts)
+def blind(begin: float, _: float) -> Lens:
+    return lambda said, now: [said][isinstance(said, messages.GlobalPositionInt) and now > begin :]
 
-    def _lags(self) -> None:
-        """Tell the item under way a message later, which is a second."""
-        told: list[Message] = []
 
-        def late(said: Message, _: float) -> Sequence[Message]:
-            if isinstance(said, MissionCurrent):
-                told.append(said)
-                return told[-2:-1] or [said]
-            return [said]
+def hold_up(begin: float, end: float) -> Lens:
+    """Hold back all that the vehicle says, and then deliver it at once."""
+    held = list[Message]()
 
-        self.scene.tells(late)
+    def bursts(said: Message, now: float) -> Sequence[Message]:
+        held.append(said)
+        out = [] if begin <= now < end else held[:]
+        del held[: len(out)]
+        return out
 
-    def _denies(
-        self, picked: Callable[[Message], bool], command: int, until: float = math.inf
-    ) -> None:
-        on, denial = self.scene.mock.on, CommandAck(GROUND_STATION, command, 4)
+    return bursts
 
-        def hear(envelope: Envelope, now: float) -> Sequence[Message]:
-            denied = picked(envelope.message) and now < until
-            answers: Sequence[Message] = [denial] if denied else on(envelope, now)
-            return answers
 
-        self.scene.mock.on = hear
+def lag(*_: float) -> Lens:
+    """Tell the item under way a message later, which is a second."""
+    told: list[Message] = []
 
-    def _event(self, word: str, number: str = "0") -> Any:
-        scene, mock = self.scene, self.scene.mock
+    def late(said: Message, _: float) -> Sequence[Message]:
+        if isinstance(said, messages.MissionCurrent):
+            told.append(said)
+            return told[-2:-1] or [said]
+        return [said]
 
-        def change(part: MissionType, rows: Sequence[Any]) -> Callable[[float], object]:
-            return lambda _: mock.lists.replace(part, rows)
+    return late
 
-        match word:
-            case "interrupt":
-                return scene.interrupt
-            case "hang-up":
-                return scene.hang_up
-            case "reboot":
-                return lambda now: mock.reboot(now)
-            case "carried":
-                return lambda _: setattr(mock, "home", away(60.0))
-            case "current":
-                return scene.does(MavCommand.SET_CURRENT, float(number))
-            case "shorten":
-                rows = mock.lists.items(MissionType.MISSION)[:-2]
-                return change(MissionType.MISSION, rows)
-            case "change":  # an item of its mission
-                rows = list(mock.lists.items(MissionType.MISSION))
-                rows[5] = rows_for(self.kind, 12, shift=1e-4)[5]
-                return change(MissionType.MISSION, rows)
-            case "rally":
-                rally, part = a_mission(5, rally=RALLY), MissionType.RALLY
-                return change(part, wire_items(rally, part, vehicle_of(self.kind)))
-        return scene.does(*ORDERS[word]) if word in ORDERS else scene.sets(self.modes[word])
 
-    def play(self, looks: Sequence[tuple[float, Callable[[float], object]]]) -> str:
-        """Return the kind of the ending; `looks` are called at their times."""
-        events = [*self.events, *looks]
-        return self.scene.run(self.faults, self.until, events=events, others=self.others) or "-"
+LENSES: dict[str, Callable[..., Lens]] = {
+    "blind": blind,
+    "hold-up": hold_up,
+    "lag": lag,
+    "jump": positions(lambda p, _, north: replace(p, lat=p.lat + round(north * METRE))),
+    "stuck": positions(lambda p, first: replace(first, time_boot_ms=p.time_boot_ms)),
+    "leap": positions(
+        lambda p, _, by: replace(p, time_boot_ms=max(p.time_boot_ms + round(1000 * by), 0))
+    ),
+    "higher": positions(lambda p, _, by: replace(p, relative_alt=p.relative_alt - int(1000 * by))),
+}
+"""What becomes of what the vehicle says: places jump or stand, its clock leaps, home moves."""
+
+
+def staged(flies: str, kind: str, given: Mapping[str, str], happens: str = "") -> Scene:
+    """Return a scene as it is set up by its words."""
+    numbers = {k: float(v) for k, v in given.items() if v and k != "home"}
+    options: dict[str, Any] = {k: v for k, v in numbers.items() if k in ("boot", "place")}
+    options |= {"battery": int(numbers["battery"])} if "battery" in numbers else {}
+    options |= {"home": away(*map(float, given["home"].split(",")))} if "home" in given else {}
+    scene = Scene(
+        kind,
+        MISSIONS.get(flies),
+        solution=PLANS[flies]() if flies in PLANS else None,
+        arm=flies not in (*PLANS, "watch"),
+        lands=flies != "hovering",
+        elsewhere="elsewhere" in given,
+        parameters={name: value for name, value in numbers.items() if name.isupper()},
+        **options,
+    )
+    if "stays-armed" in given:
+        scene.mock.flight.aircraft.landed = lambda _: False
+    if "refuses" in given:
+        denies(scene, starts, MavCommand.START)
+    silences = list[tuple[float, float]]()
+    for when, word, *words in map(str.split, filter(None, happens.split("; "))):
+        begin, end = (float(each) for each in (when.split("-") * 2)[:2])
+        if word == "silence":
+            silences.append((begin, end))
+        elif word in ("loses", "mutes"):
+            loses(scene, PICKED[words[0]], begin, end, heard=word == "mutes")
+        elif word in LENSES:
+            scene.tells(LENSES[word](begin, end, *map(float, words)))
+        elif word == "unready":
+            denies(scene, PICKED["arm"], MavCommand.ARM, end)
+        elif word in SPEAKERS:
+            other = Companion if word == "companion" else AnotherStation
+            scene.others.append(Station(other(begin), SPEAKERS[word]))
+        else:
+            scene.events.append((begin, event(scene, kind, word, *words)))
+    faults: dict[str, Any] = {k: v for k, v in numbers.items() if k in FAULTS}
+    seed = int(faults.pop("seed", 0))
+    scene.faults = Faults(**faults, seed=seed, outages=tuple(silences))
+    scene.until = numbers.get("until", 300.0)
+    return scene
+
+
+def loses(scene: Scene, picked: Picks, begin: float, end: float, *, heard: bool) -> None:
+    scene.loses(lambda said, now: picked(said) and begin <= now < end, heard=heard)
+
+
+def denies(scene: Scene, picked: Picks, command: int, until: float = math.inf) -> None:
+    on, denial = scene.mock.on, messages.CommandAck(GROUND_STATION, command, 4)
+
+    def hear(envelope: Envelope, now: float) -> Sequence[Message]:
+        denied = picked(envelope.message) and now < until
+        answers: Sequence[Message] = [denial] if denied else on(envelope, now)
+        return answers
+
+    scene.mock.on = hear
+
+
+def event(scene: Scene, kind: str, word: str, number: str = "0") -> Any:
+    """Return what happens at a time: it is called with that."""
+    mock, part = scene.mock, MissionType.MISSION
+    rows = list(mock.lists.items(part))
+    match word:
+        case "interrupt":
+            return scene.interrupt
+        case "hang-up":
+            return scene.hang_up
+        case "reboot":
+            return lambda now: mock.reboot(now)
+        case "carried":
+            return lambda _: setattr(mock, "home", away(60.0))
+        case "current":
+            return scene.does(MavCommand.SET_CURRENT, float(number))
+        case "shorten":
+            rows = rows[:-2]
+        case "change":  # an item of its mission
+            rows[5] = rows_for(kind, 12, shift=1e-4)[5]
+        case "rally":
+            part = MissionType.RALLY
+            rows = list(wire_items(a_mission(5, rally=RALLY), part, vehicle_of(kind)))
+        case _:
+            return scene.does(*ORDERS[word]) if word in ORDERS else scene.sets(MODES[kind][word])
+    return lambda _: mock.lists.replace(part, rows)

@@ -306,29 +306,6 @@ def test_a_home_that_comes_late_or_never() -> None:
     assert heights(made_of(later)) == pytest.approx(10.0 + np.arange(POSITIONS))
 
 
-def test_an_estimate_of_the_wind_that_is_none_does_not_count() -> None:
-    for value, mean in ((2.0, [2.0, 1.0]), (np.nan, None), (0.0, None), (1e30, None)):
-        said: list[Said] = []
-        for k in range(POSITIONS):
-            wind = {"wind_y": value, "wind_x": value / 2}
-            said += [bin_position(k, 20.0, 500.0), (0, 0, "WIND_COV", wind)]
-        found = made_of(said).mean_wind(101.0, 12.0)
-        assert found == (None if mean is None else pytest.approx(mean))
-
-
-def test_the_autopilot_of_a_system_counts() -> None:
-    def said(system: int, component: int, height: float, count: int = POSITIONS) -> list[Said]:
-        told = (tlog_position(k, height, 500.0) for k in range(count))
-        return [(system, component, *each[2:]) for each in told]
-
-    log = [*said(1, 191, 9.0), *said(1, 1, 1.0, 20), *said(2, 1, 2.0)]
-    log += [*said(3, 1, 9.0, 5), *said(3, 5, 3.0), *said(3, 191, 9.0, 30)]
-    records = [FlightRecord.of(*each) for each in flights(Path("flight"), log)]
-    found = {record.system: heights(record).tolist() for record in records}
-    assert found == {1: [1.0] * 20, 2: [2.0] * POSITIONS, 3: [3.0] * POSITIONS}
-    assert [number for *_, number in flights(Path("flight"), log, 2)] == [2]
-
-
 def test_a_clock_that_runs_for_days_is_refused() -> None:
     said = [bin_position(4500 * k, 20.0, 500.0) for k in range(POSITIONS + 50)]
     with pytest.raises(InputError, match="27 hours"):

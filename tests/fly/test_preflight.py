@@ -175,7 +175,7 @@ def test_a_parameter_that_is_changed_before_it_is_armed_counts(kind: str) -> Non
     def change(now: float) -> None:
         scene.mock.on(Envelope(GROUND_STATION, ParamSet(VEHICLE, name, 2 * value, 9)), now)
 
-    assert scene.run(events=[(1.5, change)]) == "refused"
+    assert scene.run([(1.5, change)]) == "refused"
     assert scene.orders == []
     assert f"{name} is {2 * value:g}, not {value:g}" in scene.watch.outcome.text
     untimed = Scene(kind, flight=flight, arm=True, parameters={name: 2 * value}, untimed=True)

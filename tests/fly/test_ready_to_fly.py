@@ -24,8 +24,15 @@ def run(*arguments: object) -> Result:
 
 
 @pytest.fixture
-def to(request: pytest.FixtureRequest) -> str:
+def to() -> str:
     return f"udpout:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Path:
+    path = tmp_path / "m.waypoints"
+    path.write_text(render_mission(a_mission(6), path))
+    return path
 
 
 def vehicle(to: str, kind: Any = "ardupilot", **options: Any) -> Any:
@@ -35,15 +42,7 @@ def vehicle(to: str, kind: Any = "ardupilot", **options: Any) -> Any:
     return running(MockAutopilot(behaviour_of(kind), **settings), listen)
 
 
-def written(folder: Path, name: str = "m.waypoints", **target: Any) -> Path:
-    mission = a_mission(6)
-    path = folder / name
-    path.write_text(render_mission(mission, path, PlanTarget(**target) if target else None))
-    return path
-
-
-def test_an_upload_says_where_the_vehicle_stands(tmp_path: Path, to: str) -> None:
-    mission = written(tmp_path)
+def test_an_upload_says_where_the_vehicle_stands(mission: Path, to: str) -> None:
     with vehicle(to, home=away(1_500.0, -32.0)):
         result = run("upload", mission, "--to", to)
         assert result.exit_code == 0, result.output
@@ -59,42 +58,31 @@ def test_an_upload_says_where_the_vehicle_stands(tmp_path: Path, to: str) -> Non
         assert "stands       not known how far from the mission's home" in result.stdout
 
 
-@pytest.mark.parametrize(
-    ("name", "target", "beside", "kind", "aircraft"),
-    [
-        ("m.plan", {"firmware": 12, "vehicle_type": 2}, "", "ardupilot", "copter"),
-        ("m.plan", {"firmware": 3, "vehicle_type": 20}, "", "ardupilot", "copter"),
-        ("m.waypoints", {}, "m.params", "ardupilot", "plane"),
-    ],
-)
-def test_a_mission_for_another_vehicle_is_not_uploaded(
-    tmp_path: Path, to: str, name: str, target: Any, beside: str, kind: str, aircraft: str
-) -> None:
-    mission = written(tmp_path, name, **target)
-    if beside:
-        (tmp_path / beside).write_text("1\t1\tMPC_XY_CRUISE\t8.0\t9\n")
-    with vehicle(to, kind, aircraft=aircraft) as mock:
-        result = run("upload", mission, "--to", to)
-        assert result.exit_code == 1
-        assert "the mission is for" in result.stderr
-        assert f"the vehicle is {kind} and a {aircraft}: nothing is uploaded" in result.stderr
-        assert mock.mission().items == ()
+def test_a_mission_for_another_vehicle_is_not_uploaded(tmp_path: Path, to: str) -> None:
+    plan, beside = tmp_path / "m.plan", tmp_path / "w.waypoints"
+    plan.write_text(render_mission(a_mission(6), plan, PlanTarget(firmware=3, vehicle_type=20)))
+    beside.write_text(render_mission(a_mission(6), beside))
+    beside.with_suffix(".params").write_text("1\t1\tMPC_XY_CRUISE\t8.0\t9\n")
+    for mission, aircraft in ((plan, "copter"), (beside, "plane")):
+        with vehicle(to, aircraft=aircraft) as mock:
+            result = run("upload", mission, "--to", to)
+            assert result.exit_code == 1
+            assert "the mission is for" in result.stderr
+            told = f"the vehicle is ardupilot and a {aircraft}: nothing is uploaded"
+            assert told in result.stderr
+            assert mock.mission().items == ()
 
 
-def test_the_missions_own_parameters_are_set_and_no_others(tmp_path: Path, to: str) -> None:
-    mission, file = written(tmp_path), tmp_path / "own.param"
+def test_the_missions_own_parameters_are_set_and_no_others(mission: Path, to: str) -> None:
+    file = mission.with_name("own.param")
     give = ("upload", mission, "--to", to, "--parameters", file)
     with vehicle(to) as mock:
         before = dict(mock.parameters.values)
         for lines, status, told in (
-            (
-                "WPNAV_ACCEL,400\nFENCE_ENABLE,1",
-                2,
-                "FENCE_ENABLE: not among what a mission is timed for",
+            *(
+                (f"WPNAV_ACCEL,400\n{name},1", 2, f"{name}: not among what a mission is timed for")
+                for name in ("FENCE_ENABLE", "FS_THR_ENABLE", "RTL_ALT", "ARMING_CHECK")
             ),
-            ("WPNAV_ACCEL,400\nFS_THR_ENABLE,0", 2, "FS_THR_ENABLE: not among"),
-            ("WPNAV_ACCEL,400\nRTL_ALT,3000", 2, "RTL_ALT: not among"),
-            ("WPNAV_ACCEL,400\nARMING_CHECK,0", 2, "ARMING_CHECK: not among what a mission"),
             ("MPC_ACC_HOR,4", 1, "the vehicle has no MPC_ACC_HOR: nothing was set or uploaded"),
         ):
             file.write_text(lines)
@@ -112,10 +100,9 @@ def test_the_missions_own_parameters_are_set_and_no_others(tmp_path: Path, to: s
 
 
 def test_nothing_is_armed_past_the_gate_but_what_an_option_overrules(
-    tmp_path: Path, to: str
+    mission: Path, to: str
 ) -> None:
     """It stands elsewhere, and another mission has left its fence and rally points."""
-    mission = written(tmp_path)
     with vehicle(to, home=away(200.0), parameters={"FENCE_ENABLE": 0}) as mock:
         assert upload(a_mission(5, fence=FENCE, rally=RALLY), to).verified
         assert run("upload", mission, "--to", to).exit_code == 0

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import is_setpoint
-from stages import ORDERS, Stage
+from stages import MODES, ORDERS, staged
 
 SCENES = Path(__file__).parents[1] / "data" / "fly" / "scenes.txt"
 
@@ -47,8 +47,8 @@ def rows() -> Iterator[Any]:
 def test_what_becomes_of_it(
     flies: str, kind: str, given: dict[str, str], happens: str, becomes: str
 ) -> None:
-    stage = Stage(flies, kind, given, happens)
-    scene, watch, mock = stage.scene, stage.scene.watch, stage.scene.mock
+    scene = staged(flies, kind, given, happens)
+    watch, mock, modes = scene.watch, scene.mock, MODES[kind]
     ending, *wanted = becomes.split(" & ")
     seen: dict[str, Any] = {}
     looks: list[tuple[float, Callable[[float], object]]] = []
@@ -64,7 +64,7 @@ def test_what_becomes_of_it(
             look(each, float(first), lambda: mock.mode)
         elif words == ["disarmed"]:
             look(each, float(first), lambda: mock.armed)
-    assert stage.play(looks) == ending
+    assert scene.run(looks) == ending
     outcome, said = watch.outcome, watch.seen.told
     for each in wanted:
         first, *words = each.split()
@@ -83,7 +83,7 @@ def test_what_becomes_of_it(
             case "finds":
                 told = [
                     f"{finding.rule} {finding.message} {finding.action}"
-                    for finding in watch.findings
+                    for finding in watch.gate.findings
                 ]
                 assert any(rest in text for text in told)
             case "no":
@@ -111,15 +111,17 @@ def test_what_becomes_of_it(
             case "gated":
                 scene.assert_gated(*map(float, words))
             case "arrived":
-                scene.assert_arrived()
+                assert scene.solution is not None
+                last = watch.seen.record().line(scene.solution).w[-1]
+                assert np.linalg.norm(last - scene.solution.w[-1]) < 1.0
             case "heard":
                 assert watch.seen.fixes[-1].t > float(rest)
             case "armed" | "disarmed":
                 assert mock.armed == (first == "armed")
             case "end":
-                assert mock.mode == stage.modes[words[1]]
+                assert mock.mode == modes[words[1]]
             case _ if words[0] == "mode":
-                assert seen[each] == stage.modes[words[1]]
+                assert seen[each] == modes[words[1]]
             case _:
                 assert words == ["disarmed"]
                 assert seen[each] is False

@@ -8,26 +8,20 @@ from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
 from scenes import Scene, low, under
-from stages import Stage
-from stations import peer_of, vehicle_of
+from stages import staged
+from stations import a_mission, peer_of, vehicle_of
 
-from faao_mav import optimize
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InfeasibleError, InputError
+from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.setpoints import OwnClock
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import Held
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.sim.faults import Faults
 from faao_mav.validate.flown import FlightRecord
-from faao_mav.wire.messages import (
-    CurrentMode,
-    Heartbeat,
-    SetPositionTargetLocalNed,
-    Timesync,
-)
+from faao_mav.wire import messages
 from faao_mav.wire.parameters import Reading
 from faao_mav.wire.transfer import Peer
 
@@ -45,14 +39,16 @@ def flown(scene: Scene, solution: Solution) -> Prediction:
     return record.line(solution, scene.watch.relay_start).priced(solution)
 
 
-def setpoints(scene: Scene) -> list[SetPositionTargetLocalNed]:
-    return [each for each in scene.client.sent if isinstance(each, SetPositionTargetLocalNed)]
+def setpoints(scene: Scene) -> list[messages.SetPositionTargetLocalNed]:
+    return [
+        each for each in scene.client.sent if isinstance(each, messages.SetPositionTargetLocalNed)
+    ]
 
 
 @pytest.mark.parametrize(("kind", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("px4", 0.2)])
 def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
-    solution, scene = low(), Scene(kind, solution=low())
-    assert scene.run(Faults(loss=loss, seed=3)) == "finished"
+    solution, scene = low(), staged("low", kind, {"loss": f"{loss}", "seed": "3"})
+    assert scene.run() == "finished"
     assert not scene.mock.armed
     found = flown(scene, solution)
     assert found.rms_position_error < (0.3 if not loss else 0.6)
@@ -66,25 +62,11 @@ def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
     assert {each.type_mask for each in setpoints(scene)} == {3072}
 
 
-def test_a_convoy_is_served_as_planned() -> None:
-    velocities = dict.fromkeys(
-        ("radio.base_station.velocity", "radio.ground_user.velocity"), (5, 0)
-    )
-    changes = {"flight.duration": 24, "flight.end": [110, 20], "radio.causal": True}
-    solution = optimize(low().plan.changed(velocities | changes))
-    scene = Scene("px4", solution=solution)
-    assert scene.run(Faults()) == "finished"
-    found = flown(scene, solution)
-    assert found.delivered_rate == pytest.approx(solution.delivered_rate, rel=0.01)
-    late = flown(scene, replace(solution, problem=solution.problem.begun(10.0)))
-    assert late.delivered_rate < 0.9 * solution.delivered_rate
-
-
 def test_only_copters_are_flown_by_setpoints() -> None:
     peer = peer_of("ardupilot")
     plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
     with pytest.raises(InputError, match="only copters"):
-        Stream(plane, low(), Held({}, Reading({})), lambda *_: ())
+        Stream(Clearance(Flight(a_mission(5), solution=low()), plane, Held({}, Reading({}))))
 
 
 @pytest.mark.parametrize("finish", ["rtl", "hover"])
@@ -118,15 +100,17 @@ def test_local_frames_go_there_and_back(
     np.testing.assert_allclose(frame.to_local(*frame.to_geodetic(there)), there, atol=1e-3)
     own = LocalFrame(latitude, 179.99)
     apart = np.linalg.norm(own.to_local(*frame.to_geodetic(there)) - there)
-    assert apart <= 0.0075 * np.linalg.norm(there) + 1e-6  # each has another Earth
+    assert apart <= 0.0075 * np.linalg.norm(there) + 1e-4  # each has another Earth
 
 
 def test_what_others_asked_tells_nothing_of_the_link() -> None:
     clock = OwnClock()
     for now in (1.0, 2.0, 3.0):
         own = clock.ask(now).ts1
-        clock.hear(Timesync(int(2e9 * now), own), now + 0.1)
-        clock.hear(Timesync(int(2e9 * now), own - 500_000_000), now + 0.2)  # another station's
+        clock.hear(messages.Timesync(int(2e9 * now), own), now + 0.1)
+        clock.hear(
+            messages.Timesync(int(2e9 * now), own - 500_000_000), now + 0.2
+        )  # another station's
     assert clock.speed == pytest.approx(2.0)
     assert clock.lead == pytest.approx(0.2)
 
@@ -134,11 +118,13 @@ def test_what_others_asked_tells_nothing_of_the_link() -> None:
 def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> None:
     """It was in that mode for want of setpoints before: the last that was heard is a failsafe."""
     happens = "44-48.5 loses setpoints; 47-50 silence; 48 hold; 70 land"
-    stage = Stage("swift", "px4", {"COM_OBL_RC_ACT": "5"}, happens)
-    scene, modes = stage.scene, Heartbeat | CurrentMode
+    scene, modes = (
+        staged("swift", "px4", {"COM_OBL_RC_ACT": "5"}, happens),
+        messages.Heartbeat | messages.CurrentMode,
+    )
     # These come after positions, when the link is back.
     scene.tells(lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :])
-    assert stage.play(()) == "taken over"
+    assert scene.run() == "taken over"
     assert scene.told("it is in its failsafe")
     assert scene.after(50.0) == 0
 

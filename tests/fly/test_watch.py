@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 from scenes import Scene, arms, starts
-from stages import Stage
+from stages import staged
 from stations import VEHICLE
 
 from faao_mav.wire.messages import CommandAck, CommandLong, Envelope
@@ -34,22 +34,22 @@ def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
 
 
 def test_a_late_answer_to_arming_is_none_to_disarming() -> None:
-    stage = Stage("mission", "ardupilot", {"refuses": ""}, "0-10 loses disarm")
+    scene = staged("mission", "ardupilot", {"refuses": ""}, "0-10 loses disarm")
 
     def answer(now: float) -> None:
         ack = CommandAck(GROUND_STATION, MavCommand.ARM, 0)
-        stage.scene.client.on(Envelope(VEHICLE, ack), now)
+        scene.client.on(Envelope(VEHICLE, ack), now)
 
-    assert stage.play([(3.0, answer), (3.1, answer)]) == "refused"
-    assert not stage.scene.mock.armed
+    assert scene.run([(3.0, answer), (3.1, answer)]) == "refused"
+    assert not scene.mock.armed
 
 
 @KINDS
 def test_what_refuses_to_disarm_is_told_as_armed(kind: str) -> None:
-    stage = Stage("mission", kind, {"refuses": ""}, "")
-    scene, arm = stage.scene, stage.scene.mock._arm
+    scene = staged("mission", kind, {"refuses": ""})
+    arm = scene.mock._arm
     scene.mock._arm = lambda wanted: arm(True) if wanted else 4
-    assert stage.play(()) == "refused"
+    assert scene.run() == "refused"
     assert "it may still be armed: it answers ARM with FAILED" in scene.watch.outcome.text
     assert scene.commands.count(DISARM) == 5
 

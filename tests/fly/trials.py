@@ -9,20 +9,15 @@ from random import Random
 from typing import Any, get_args
 
 import numpy as np
-from scenes import LOITER, arms, harmless
-from stages import PLANS, Stage
+from scenes import LOITER, Scene, arms, harmless
+from stages import PLANS, staged
 from stations import VEHICLE, Counted
 
 from faao_mav.fly.itinerary import LEVEL, NEAR
 from faao_mav.fly.telemetry import Kind
 from faao_mav.geodesy import LocalFrame
-from faao_mav.wire.messages import (
-    Envelope,
-    GlobalPositionInt,
-    Heartbeat,
-    Message,
-    SetPositionTargetLocalNed,
-)
+from faao_mav.wire import messages
+from faao_mav.wire.messages import Envelope, Message
 
 _END = "400 loiter; 405 disarm; 420 interrupt; 430 interrupt"
 """What still flies then the pilot lands, and it is left."""
@@ -119,13 +114,13 @@ _INCIDENTS: dict[str, Any] = {
 class Judge(Counted):
     """A watch whose every message is judged as it is sent: `wrong` is what must not happen."""
 
-    def __init__(self, trial: Trial, stage: Stage) -> None:
-        super().__init__(stage.scene.watch)
-        self.trial, self.home, self.faults = trial, stage.scene.mock.home, stage.faults
-        self.solution = stage.scene.solution
+    def __init__(self, trial: Trial, scene: Scene) -> None:
+        super().__init__(scene.watch)
+        self.trial, self.home, self.faults = trial, scene.mock.home, scene.faults
+        self.solution = scene.solution
         self.wrong: list[str] = []
         self.setpoints = 0
-        self._told: GlobalPositionInt | None = None
+        self._told: messages.GlobalPositionInt | None = None
         self._mode: int | None = None
         self._ordered, self._ordered_at, self._pilots = False, 0.0, False
 
@@ -152,10 +147,10 @@ class Judge(Counted):
 
     def _hear(self, message: Message) -> None:
         match message:
-            case GlobalPositionInt(time_boot_ms=t):
+            case messages.GlobalPositionInt(time_boot_ms=t):
                 if self._told is None or t > self._told.time_boot_ms:
                     self._told = message
-            case Heartbeat(custom_mode=mode):
+            case messages.Heartbeat(custom_mode=mode):
                 took = mode == LOITER and self._mode != LOITER
                 self._pilots |= self._ordered and took
                 self._mode = mode
@@ -169,12 +164,12 @@ class Judge(Counted):
                 self.wrong.append(f"{now:.1f} s: armed")
             if self._pilots:
                 self.wrong.append(f"{now:.1f} s: {type(message).__name__} to what a pilot has")
-            if isinstance(message, SetPositionTargetLocalNed):
+            if isinstance(message, messages.SetPositionTargetLocalNed):
                 self.setpoints += 1
                 self._measure(message, now)
         return sent
 
-    def _measure(self, setpoint: SetPositionTargetLocalNed, now: float) -> None:
+    def _measure(self, setpoint: messages.SetPositionTargetLocalNed, now: float) -> None:
         """Compare where it is sent with where it said that it is."""
         told = self._told
         assert self.solution is not None
@@ -198,9 +193,9 @@ class Judge(Counted):
 def flown(trial: Trial) -> Judge:
     """Fly it, and return what it is judged by."""
     given = dict(word.partition("=")[::2] for word in trial.given)
-    stage = Stage(trial.flies, trial.kind, given, trial.happens)
-    judge = stage.scene.client = Judge(trial, stage)
-    stage.play(())
+    scene = staged(trial.flies, trial.kind, given, trial.happens)
+    judge = scene.client = Judge(trial, scene)
+    scene.run()
     outcome = judge.outcome
     if outcome is None or outcome.kind not in get_args(Kind) or not outcome.text:
         judge.wrong.append(f"no end, or one without a name: {outcome}")

@@ -9,18 +9,8 @@ from exchanges import exchanges, played, recorded
 from stations import FOREIGN, VEHICLE, Desk, mock_of, places, rows_for
 
 from faao_mav.sim import Behaviour, behaviour_of
-from faao_mav.wire.messages import (
-    ListMessage,
-    Message,
-    MissionAck,
-    MissionCount,
-    MissionItemInt,
-    MissionRequest,
-    MissionRequestInt,
-    MissionRequestList,
-    Statustext,
-    WireItem,
-)
+from faao_mav.wire import messages
+from faao_mav.wire.messages import Message, WireItem
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 
 MISSION, _, RALLY = MissionType
@@ -34,20 +24,20 @@ def desk_for(kind: str | Behaviour, **options: Any) -> Desk:
     return desk
 
 
-def count(n: int, part: int = MISSION) -> MissionCount:
-    return MissionCount(VEHICLE, part, n)
+def count(n: int, part: int = MISSION) -> messages.MissionCount:
+    return messages.MissionCount(VEHICLE, part, n)
 
 
-def item(seq: int, row: WireItem, part: MissionType = MISSION) -> MissionItemInt:
-    return MissionItemInt(VEHICLE, part, seq, row)
+def item(seq: int, row: WireItem, part: MissionType = MISSION) -> messages.MissionItemInt:
+    return messages.MissionItemInt(VEHICLE, part, seq, row)
 
 
-def results(messages: Sequence[Message]) -> list[int]:
-    return [message.type for message in messages if isinstance(message, MissionAck)]
+def results(said: Sequence[Message]) -> list[int]:
+    return [message.type for message in said if isinstance(message, messages.MissionAck)]
 
 
-def asked(messages: Sequence[Message]) -> list[int]:
-    return [message.seq for message in messages if isinstance(message, MissionRequestInt)]
+def asked(said: Sequence[Message]) -> list[int]:
+    return [message.seq for message in said if isinstance(message, messages.MissionRequestInt)]
 
 
 def upload(desk: Desk, rows: Sequence[WireItem], sender: Address = GROUND_STATION) -> list[int]:
@@ -70,10 +60,10 @@ def upload(desk: Desk, rows: Sequence[WireItem], sender: Address = GROUND_STATIO
 def test_the_mock_answers_as_the_real_one(kind: str, aircraft: str, real: str) -> None:
     desk = desk_for(kind, aircraft=aircraft)
 
-    def talk(messages: list[Message], seconds: float, expected: int) -> list[Message]:
-        said = [answer for message in messages for answer in desk.tell(message)]
-        said += [] if messages else desk.wait(seconds)
-        return [answer for answer in said if isinstance(answer, ListMessage)]
+    def talk(sent: list[Message], seconds: float, expected: int) -> list[Message]:
+        said = [answer for message in sent for answer in desk.tell(message)]
+        said += [] if sent else desk.wait(seconds)
+        return [answer for answer in said if isinstance(answer, messages.ListMessage)]
 
     for name, lines in exchanges(recorded(real)).items():
         assert (name, played(lines, talk, VEHICLE)) == (name, lines)
@@ -93,7 +83,7 @@ def test_an_upload_that_stops_is_asked_for_and_given_up() -> None:
         assert asked(desk.wait(1.01)) == [3] * asks
         out = desk.wait(patience - 1.0)
         assert results(out) == answers
-        assert any(isinstance(each, Statustext) and "timeout" in each.text for each in out)
+        assert any(isinstance(each, messages.Statustext) and "timeout" in each.text for each in out)
         held = (*new[:3], *old[3:]) if kind == "ardupilot" else old
         assert places(desk.machine.lists.items(MISSION)) == places(held)
         assert results(desk.tell(item(3, new[3]))) == [MavResult.ERROR]
@@ -128,10 +118,10 @@ def test_what_is_no_list_or_comes_before_it_is_ready() -> None:
 def test_px4_changes_its_request_when_told_unsupported_and_is_freed_by_a_cancellation() -> None:
     desk = desk_for("px4")
     (request,) = desk.tell(count(3))
-    (other,) = desk.tell(MissionAck(VEHICLE, 0, MavResult.UNSUPPORTED))
-    assert request == MissionRequest(GROUND_STATION, 0, 0)
-    assert other == MissionRequestInt(GROUND_STATION, 0, 0)
-    desk.tell(MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED))
+    (other,) = desk.tell(messages.MissionAck(VEHICLE, 0, MavResult.UNSUPPORTED))
+    assert request == messages.MissionRequest(GROUND_STATION, 0, 0)
+    assert other == messages.MissionRequestInt(GROUND_STATION, 0, 0)
+    desk.tell(messages.MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED))
     assert asked(desk.tell(count(3), FOREIGN)) == [0]
 
 
@@ -160,7 +150,7 @@ def test_numbers_tell_px4_lists_apart() -> None:
     numbers = []
     for shift in (0.0, 0.1, 0.0):
         upload(desk, rows_for("px4", 3, shift))
-        (found,) = desk.tell(MissionRequestList(VEHICLE, 0))
-        desk.tell(MissionAck(VEHICLE, 0, MavResult.ACCEPTED))
+        (found,) = desk.tell(messages.MissionRequestList(VEHICLE, 0))
+        desk.tell(messages.MissionAck(VEHICLE, 0, MavResult.ACCEPTED))
         numbers.append(found.opaque_id)
     assert numbers[0] == numbers[2] != numbers[1]

@@ -13,21 +13,8 @@ from faao_mav.autopilot.px4 import PX4, px4_mode
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire.messages import (
-    CommandAck,
-    CommandLong,
-    GlobalPositionInt,
-    Heartbeat,
-    Message,
-    MissionClearAll,
-    MissionCurrent,
-    ParamRequestList,
-    ParamRequestRead,
-    ParamSet,
-    SetMode,
-    SetPositionTargetLocalNed,
-    Statustext,
-)
+from faao_mav.wire import messages
+from faao_mav.wire.messages import Message
 from faao_mav.wire.parameters import value_in
 from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
 from faao_mav.wire.wire_items import wire_items
@@ -36,7 +23,7 @@ T = TypeVar("T", bound=Message)
 
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 AUTO = {"ardupilot": 3, "px4": 4 << 16 | 4 << 24}
-STILL = SetPositionTargetLocalNed(VEHICLE, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 0, 0)
+STILL = messages.SetPositionTargetLocalNed(VEHICLE, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 0, 0)
 """A setpoint 20 m above home."""
 
 
@@ -49,17 +36,17 @@ def desk_for(kind: MockKind, mission: Mission | None = None, **options: Any) -> 
     return desk
 
 
-def command(number: int, *params: float) -> CommandLong:
-    return CommandLong(VEHICLE, number, 0, *map(float, params))
+def command(number: int, *params: float) -> messages.CommandLong:
+    return messages.CommandLong(VEHICLE, number, 0, *map(float, params))
 
 
-def result(messages: Sequence[Message]) -> int:
-    (ack,) = [message for message in messages if isinstance(message, CommandAck)]
+def result(said: Sequence[Message]) -> int:
+    (ack,) = only(said, messages.CommandAck)
     return ack.result
 
 
-def only(messages: Sequence[Message], kind: type[T]) -> list[T]:
-    return [message for message in messages if isinstance(message, kind)]
+def only(said: Sequence[Message], kind: type[T]) -> list[T]:
+    return [message for message in said if isinstance(message, kind)]
 
 
 def stream(desk: Desk) -> None:
@@ -71,38 +58,23 @@ def stream(desk: Desk) -> None:
 
 def take_off(desk: Desk, kind: MockKind) -> None:
     assert result(desk.tell(command(400, 1))) == 0
-    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
+    assert result(desk.tell(messages.SetMode(1, 1, AUTO[kind]))) == 0
 
 
 def height(desk: Desk, seconds: float) -> float:
     """Return how high it is after a while, m above home."""
-    return only(desk.wait(seconds), GlobalPositionInt)[-1].relative_alt / 1000
-
-
-@BOTH
-def test_a_whole_flight(kind: MockKind) -> None:
-    desk = desk_for(kind, a_mission(12), speedup=10.0)
-    take_off(desk, kind)
-    assert desk.machine.armed
-    out = desk.wait(60.0)
-    assert not desk.machine.armed
-    heights = [message.relative_alt / 1000 for message in only(out, GlobalPositionInt)]
-    returns = {"ardupilot": 30.0, "px4": 60.0}[kind]  # RTL_RETURN_ALT
-    assert max(heights) == pytest.approx(returns, abs=0.1)
-    assert heights[-1] == 0
-    currents = [message.seq for message in only(out, MissionCurrent)]
-    assert currents == sorted(currents)
-    assert only(out, Heartbeat)[-1].base_mode & 128 == 0
+    return only(desk.wait(seconds), messages.GlobalPositionInt)[-1].relative_alt / 1000
 
 
 def test_a_plane_has_its_own_number_and_modes() -> None:
     desk = desk_for("ardupilot", a_mission(5), aircraft="plane", speedup=20.0)
     assert result(desk.tell(command(400, 1))) == 0
-    assert result(desk.tell(SetMode(1, 1, AUTO["ardupilot"]))) == 0  # TRAINING, for a plane
+    training = messages.SetMode(1, 1, AUTO["ardupilot"])  # for a plane
+    assert result(desk.tell(training)) == 0
     assert height(desk, 2.0) == 0
-    assert result(desk.tell(SetMode(1, 1, 10))) == 0
+    assert result(desk.tell(messages.SetMode(1, 1, 10))) == 0
     assert height(desk, 2.0) > 0
-    assert only(desk.wait(1.5), Heartbeat)[-1].type == 1
+    assert only(desk.wait(1.5), messages.Heartbeat)[-1].type == 1
 
 
 @BOTH
@@ -110,17 +82,17 @@ def test_it_does_not_fly_without_a_mission_or_without_being_armed_and_told_to(
     kind: MockKind,
 ) -> None:
     desk = desk_for(kind)
-    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == {"ardupilot": 4, "px4": 1}[kind]
+    assert result(desk.tell(messages.SetMode(1, 1, AUTO[kind]))) == {"ardupilot": 4, "px4": 1}[kind]
     assert result(desk.tell(command(300))) == 2
     desk = desk_for(kind, a_mission(5))
-    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
+    assert result(desk.tell(messages.SetMode(1, 1, AUTO[kind]))) == 0
     assert height(desk, 5.0) == 0
     desk = desk_for(kind, a_mission(5))
     assert result(desk.tell(command(400, 1))) == 0
     assert height(desk, 5.0) == 0
     assert result(desk.tell(command(300))) == 0
     assert height(desk, 5.0) > 0
-    (ack,) = desk.tell(MissionClearAll(VEHICLE, 0))
+    (ack,) = desk.tell(messages.MissionClearAll(VEHICLE, 0))
     assert ack.type == (MavResult.ERROR if kind == "ardupilot" else MavResult.ACCEPTED)
 
 
@@ -144,22 +116,24 @@ def test_a_mission_is_broken_off_and_flown_on(kind: MockKind) -> None:
     """In another mode it holds its place, or returns; disarmed it stands at home."""
     desk = desk_for(kind, a_mission(12))
     take_off(desk, kind)
-    desk.tell(SetMode(1, 1, 0))
+    desk.tell(messages.SetMode(1, 1, 0))
     assert height(desk, 2.0) == 0
-    assert result(desk.tell(SetMode(1, 1, AUTO[kind]))) == 0
+    assert result(desk.tell(messages.SetMode(1, 1, AUTO[kind]))) == 0
     desk.wait(20.0)
     there = desk.machine.flight.aircraft.at(desk.now)
-    desk.tell(SetMode(1, 1, 0))
+    desk.tell(messages.SetMode(1, 1, 0))
     desk.wait(20.0)
     held = desk.machine.flight.aircraft.at(desk.now)
     assert held.position == pytest.approx(there.position, abs=0.1)
     assert held.item == there.item
-    desk.tell(SetMode(1, 1, AUTO[kind]))
-    assert not only(desk.wait(1.0), Statustext)
-    desk.tell(SetMode(1, 1, desk.machine.flight.modes.at_fence["return"]))
-    assert "Landed, disarming" in [text.text for text in only(desk.wait(300.0), Statustext)]
+    desk.tell(messages.SetMode(1, 1, AUTO[kind]))
+    assert not only(desk.wait(1.0), messages.Statustext)
+    desk.tell(messages.SetMode(1, 1, desk.machine.flight.modes.at_fence["return"]))
+    assert "Landed, disarming" in [
+        text.text for text in only(desk.wait(300.0), messages.Statustext)
+    ]
     assert desk.machine.flight.aircraft.at(desk.now).position == pytest.approx([0, 0, 0])
-    desk.tell(SetMode(1, 1, AUTO[kind]))
+    desk.tell(messages.SetMode(1, 1, AUTO[kind]))
     assert result(desk.tell(command(400, 1))) == 0
     assert height(desk, 3.0) > 0
     assert result(desk.tell(command(400, 0))) == 0
@@ -172,35 +146,35 @@ def test_no_command_and_no_setpoint_brings_it_down(kind: MockKind) -> None:
         desk = desk_for(kind, a_mission(3))
         for number in (176, 224, 300, 400, 22, 511, 512, 16, 0, 65_535):
             desk.tell(command(number, *[value] * 7))
-            assert only(desk.wait(2.0), Heartbeat), number
+            assert only(desk.wait(2.0), messages.Heartbeat), number
     desk = desk_for(kind)
     stream(desk)
-    assert result(desk.tell(SetMode(1, 1, desk.machine.flight.modes.guided))) == 0
+    assert result(desk.tell(messages.SetMode(1, 1, desk.machine.flight.modes.guided))) == 0
     assert result(desk.tell(command(400, 1))) == 0
     desk.tell(command(22, *[0] * 6, 20.0))
     for value in (0.0, math.nan, math.inf, 3e38, -3e38):
         for field in ("x", "vx", "afx"):
             wrong: dict[str, Any] = {field: value}
             desk.tell(replace(STILL, **wrong))
-            assert only(desk.wait(0.5), GlobalPositionInt)
+            assert only(desk.wait(0.5), messages.GlobalPositionInt)
     assert desk.machine.armed
 
 
 @BOTH
 def test_parameters(kind: MockKind) -> None:
     desk = desk_for(kind)
-    values = desk.tell(ParamRequestList(VEHICLE))
+    values = desk.tell(messages.ParamRequestList(VEHICLE))
     assert [value.param_index for value in values] == list(range(len(values)))
     assert {value.param_count for value in values} == {len(values)}
     vehicle = desk.machine.vehicle
     told = {value.param_id: value_in(value, vehicle) for value in values}
     assert told.items() >= vehicle.defaults().items()
     second = values[1]
-    assert desk.tell(ParamRequestRead(VEHICLE, "", 1)) == [second]
-    assert desk.tell(ParamRequestRead(VEHICLE, second.param_id, -1)) == [second]
-    assert desk.tell(ParamRequestRead(VEHICLE, "NO_SUCH", -1)) == []
-    assert desk.tell(ParamRequestRead(VEHICLE, "", 999)) == []
-    (changed,) = desk.tell(ParamSet(VEHICLE, second.param_id, 7.0, 9))
+    assert desk.tell(messages.ParamRequestRead(VEHICLE, "", 1)) == [second]
+    assert desk.tell(messages.ParamRequestRead(VEHICLE, second.param_id, -1)) == [second]
+    assert desk.tell(messages.ParamRequestRead(VEHICLE, "NO_SUCH", -1)) == []
+    assert desk.tell(messages.ParamRequestRead(VEHICLE, "", 999)) == []
+    (changed,) = desk.tell(messages.ParamSet(VEHICLE, second.param_id, 7.0, 9))
     assert changed.param_value == 7.0
 
 
@@ -210,7 +184,7 @@ def test_a_reboot_keeps_what_is_stored() -> None:
     take_off(desk, "px4")
     stream(desk)
     assert result(desk.tell(command(246, 1))) == 0
-    assert result(desk.tell(SetMode(1, 1, px4_mode(6, 0)))) == 1  # no setpoints since
+    assert result(desk.tell(messages.SetMode(1, 1, px4_mode(6, 0)))) == 1  # no setpoints since
     assert not desk.machine.armed
     assert result(desk.tell(command(400, 1))) == 1
     assert len(desk.machine.lists.items(MissionType.MISSION)) == 5
@@ -254,14 +228,14 @@ def test_at_its_fence_it_does_what_its_parameters_say(
     desk = desk_for(kind, OUT, parameters=parameters)
     take_off(desk, kind)
     desk.wait(300.0)
-    flown = only(desk.sent, GlobalPositionInt)
+    flown = only(desk.sent, messages.GlobalPositionInt)
     north = [(place.lat * 1e-7 - HOME.latitude) * 111_000 for place in flown]
     assert max(north) == pytest.approx(farthest, abs=3)
     assert (north[-1], flown[-1].relative_alt / 1000) == pytest.approx(end, abs=3)
     assert desk.machine.armed == (end[1] > 0)
-    changes = [beat.custom_mode for beat in only(desk.sent, Heartbeat)]
+    changes = [beat.custom_mode for beat in only(desk.sent, messages.Heartbeat)]
     assert [m for m, before in zip(changes, [None, *changes], strict=False) if m != before] == modes
-    assert told == any("fence" in text.text for text in only(desk.sent, Statustext))
+    assert told == any("fence" in text.text for text in only(desk.sent, messages.Statustext))
 
 
 def test_ardupilot_does_not_arm_outside_its_fence() -> None:

@@ -25,7 +25,7 @@ from stations import (
 from faao_mav.errors import LinkError
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults
-from faao_mav.sim.lists import StoredLists
+from faao_mav.sim.storage import StoredLists
 from faao_mav.wire.discover import choose, discover
 from faao_mav.wire.jobs import explain, upload_parts
 from faao_mav.wire.machine import Script

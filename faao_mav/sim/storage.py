@@ -1,8 +1,8 @@
-"""How a mock autopilot takes, refuses, stores and gives lists of items."""
+"""What a mock autopilot stores, and how it takes, refuses and gives it: lists, parameters."""
 
 import math
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from faao_mav.autopilot import VehicleType
@@ -12,8 +12,12 @@ from faao_mav.mission.item import Home, MissionItem
 from faao_mav.sim.behaviour import COUNT, Behaviour
 from faao_mav.wire import messages
 from faao_mav.wire.messages import ListMessage, Message, WireItem
+from faao_mav.wire.parameters import carried, value_in
 from faao_mav.wire.protocol import ALL_TYPES, Address, MavResult, MavSeverity, MissionType
 from faao_mav.wire.wire_items import home_items, mission_item, mission_of, wire_item
+
+_INT32, _REAL32 = 6, 9
+"""MAV_PARAM_TYPE of whole numbers, and of single-precision ones."""
 
 
 @dataclass(slots=True)
@@ -28,6 +32,10 @@ class _Transfer:
     passed: int = 0
     asked: float = 0.0
     items: tuple[WireItem, ...] = ()
+
+    @property
+    def whose(self) -> tuple[Address, MissionType]:
+        return self.partner, self.part
 
 
 class StoredLists:
@@ -107,79 +115,77 @@ class StoredLists:
 
     def on(self, sender: Address, message: ListMessage, now: float) -> list[Message]:
         """Answer a message of the mission protocol."""
-        self._now, given = now, message.mission_type
+        self._now, self._sender, given = now, sender, message.mission_type
         everything = given == ALL_TYPES and isinstance(message, messages.MissionClearAll)
         parts = [part for part in MissionType if everything or given == part]
         if not parts:
             is_ack = isinstance(message, messages.MissionAck)
-            return [] if is_ack else _ack(sender, given, MavResult.UNSUPPORTED)
+            return [] if is_ack else self._ack(given, MavResult.UNSUPPORTED)
         part = parts[0]
         under_way = self._transfers.get(self._slot(part))
         match message:
             case messages.MissionCount(count=count):
-                return self._on_count(sender, part, count, under_way)
-            case messages.MissionItemInt():
-                return self._on_item(sender, message, under_way)
+                return self._on_count(part, count, under_way)
+            case messages.MissionItemInt(seq=seq, item=item):
+                return self._on_item(part, seq, item, under_way)
             case messages.MissionRequestList():
-                return self._on_list(sender, part, under_way)
+                return self._on_list(part, under_way)
             case messages.MissionRequestInt():
-                return self._on_request(sender, message, under_way)
+                legacy = isinstance(message, messages.MissionRequest)
+                return self._on_request(part, message.seq, under_way, legacy=legacy)
             case messages.MissionAck(type=result) if under_way is not None and self._alone:
                 return self._on_ack(part, result, under_way) if sender == under_way.partner else []
             case messages.MissionClearAll() if not (under_way and self._alone):
                 if part is MissionType.MISSION and self._flying() and not self._alone:
-                    return _ack(sender, given, MavResult.ERROR)
-                return self._clear(sender, given, parts)
+                    return self._ack(given, MavResult.ERROR)
+                return self._clear(given, parts)
         return []
 
     def _slot(self, part: MissionType) -> MissionType | None:
         return None if self._alone else part
 
     def _on_count(
-        self, sender: Address, part: MissionType, count: int, under_way: _Transfer | None
+        self, part: MissionType, count: int, under_way: _Transfer | None
     ) -> list[Message]:
         if under_way is not None:
-            again = sender == under_way.partner and not under_way.sending
+            again = self._sender == under_way.partner and not under_way.sending
             if self._alone and again and under_way.passed == 0:
                 under_way.heard = self._now
                 return self._ask(under_way)
             if self._alone or not again:
-                return _ack(sender, under_way.part, self._busy)
-        limit = (self._behaviour.mission_limit, self._dialect.fence_rows, self._dialect.rally_rows)
-        refusal = self._behaviour.refusals.get((part, COUNT))
-        if count > limit[part]:
-            text = _warning(f"Only {limit[part]} items are supported")
-            return [*_ack(sender, part, refusal or MavResult.NO_SPACE), text]
-        if refusal or not self._ready():
-            return _ack(sender, part, refusal or MavResult.NO_SPACE)
+                return self._ack(under_way.part, self._busy)
+        limits = self._behaviour.mission_limit, self._dialect.fence_rows, self._dialect.rally_rows
+        refusal, fits = self._behaviour.refusals.get((part, COUNT)), count <= limits[part]
+        if refusal or not fits or not self._ready():
+            says = [] if fits else [_warning(f"Only {limits[part]} items are supported")]
+            return [*self._ack(part, refusal or MavResult.NO_SPACE), *says]
         if count == 0:
-            return self._clear(sender, part, [part])
+            return self._clear(part, [part])
         if self._in_place(part):
             self.replace(part, self.items(part)[:count])
-        self._transfers[self._slot(part)] = upload = _Transfer(sender, part, count, self._now)
+        self._transfers[self._slot(part)] = upload = _Transfer(self._sender, part, count, self._now)
         return self._ask(upload)
 
     def _on_item(
-        self, sender: Address, message: messages.MissionItemInt, upload: _Transfer | None
+        self, part: MissionType, seq: int, item: WireItem, upload: _Transfer | None
     ) -> list[Message]:
-        part, seq = MissionType(message.mission_type), message.seq
         if upload is None:
             # PX4 acknowledges the last item of the upload before once more.
-            before = self._alone and self._whole == (sender, part, seq + 1)
-            return _ack(sender, part, MavResult.ACCEPTED if before else MavResult.ERROR)
-        if sender != upload.partner:
-            return [] if self._alone else _ack(sender, part, self._busy)
+            before = self._alone and self._whole == (self._sender, part, seq + 1)
+            return self._ack(part, MavResult.ACCEPTED if before else MavResult.ERROR)
+        if self._sender != upload.partner:
+            return [] if self._alone else self._ack(part, self._busy)
         if part != upload.part or upload.sending:
-            return _ack(sender, part, MavResult.ERROR)
+            return self._ack(part, MavResult.ERROR)
         if self._alone:
             self._legacy = False
         if seq != upload.passed:
             silent = self._manners.ignores_other_items
-            return [] if silent else _ack(sender, part, MavResult.INVALID_SEQUENCE)
-        result = self._check_item(part, seq, message.item)
+            return [] if silent else self._ack(part, MavResult.INVALID_SEQUENCE)
+        result = self._check_item(part, seq, item)
         if result != MavResult.ACCEPTED:
             return self._end(upload, result)
-        upload.items = (*upload.items, self.kept(part, seq, message.item))
+        upload.items = (*upload.items, self.kept(part, seq, item))
         upload.heard, upload.passed = self._now, seq + 1
         if self._in_place(part):
             self.replace(part, upload.items + self.items(part)[seq + 1 :])
@@ -194,38 +200,33 @@ class StoredLists:
         self.replace(part, upload.items)
         return self._end(upload, MavResult.ACCEPTED)
 
-    def _on_list(
-        self, sender: Address, part: MissionType, under_way: _Transfer | None
-    ) -> list[Message]:
-        items = self.items(part)
+    def _on_list(self, part: MissionType, under_way: _Transfer | None) -> list[Message]:
+        items, whose = self.items(part), (self._sender, part)
         if under_way is not None:
-            given = under_way.sending and under_way.passed == under_way.count
-            again = under_way.sending and (sender, part) == (under_way.partner, under_way.part)
-            if not (given or again):
-                return [] if self._alone else _ack(sender, part, self._busy)
+            given = under_way.passed == under_way.count
+            if not under_way.sending or not (given or whose == under_way.whose):
+                return [] if self._alone else self._ack(part, self._busy)
         if self._alone:
-            sending = _Transfer(sender, part, len(items), self._now, sending=True, items=items)
+            sending = _Transfer(*whose, len(items), self._now, sending=True, items=items)
             self._transfers[None] = sending
-        return [messages.MissionCount(sender, part, len(items), self.number(part))]
+        return [messages.MissionCount(*whose, len(items), self.number(part))]
 
     def _on_request(
-        self, sender: Address, request: messages.MissionRequestInt, under_way: _Transfer | None
+        self, part: MissionType, seq: int, under_way: _Transfer | None, *, legacy: bool
     ) -> list[Message]:
-        part, seq = MissionType(request.mission_type), request.seq
-        items = self.items(part)
+        items, whose = self.items(part), (self._sender, part)
         if self._alone:
-            ours = under_way is not None and (sender, part) == (under_way.partner, under_way.part)
-            if under_way is None or not ours or not under_way.sending:
+            if under_way is None or not under_way.sending or whose != under_way.whose:
                 return []
             if seq not in (under_way.passed, under_way.passed - 1) or seq == under_way.count:
                 return self._end(under_way, MavResult.ERROR)
             under_way.heard, under_way.passed, items = self._now, seq + 1, under_way.items
-        elif under_way is not None and not isinstance(request, messages.MissionRequest):
-            return _ack(sender, part, self._busy)
+        elif under_way is not None and not legacy:
+            return self._ack(part, self._busy)
         if seq >= len(items):
             wrong = MavResult.ERROR if part is MissionType.MISSION else MavResult.INVALID_SEQUENCE
-            return _ack(sender, part, wrong)
-        return [messages.MissionItemInt(sender, part, seq, items[seq])]
+            return self._ack(part, wrong)
+        return [messages.MissionItemInt(*whose, seq, items[seq])]
 
     def _on_ack(self, part: MissionType, result: int, under_way: _Transfer) -> list[Message]:
         if result == MavResult.UNSUPPORTED and not under_way.sending:
@@ -235,23 +236,26 @@ class StoredLists:
             self._end(under_way, MavResult.OPERATION_CANCELLED)
         return []
 
-    def _clear(self, sender: Address, given: int, parts: Iterable[MissionType]) -> list[Message]:
+    def _clear(self, given: int, parts: Iterable[MissionType]) -> list[Message]:
         for part in parts:
             self._transfers.pop(self._slot(part), None)
             self.replace(part, ())
-        return _ack(sender, given, MavResult.ACCEPTED)
+        return self._ack(given, MavResult.ACCEPTED)
+
+    def _ack(self, part: int, result: MavResult) -> list[Message]:
+        return [messages.MissionAck(self._sender, part, result)]
 
     def _ask(self, upload: _Transfer) -> list[Message]:
         upload.asked = self._now
         kind = messages.MissionRequest if self._legacy else messages.MissionRequestInt
-        return [kind(upload.partner, upload.part, upload.passed)]
+        return [kind(*upload.whose, upload.passed)]
 
     def _end(self, transfer: _Transfer, result: MavResult) -> list[Message]:
         del self._transfers[self._slot(transfer.part)]
         whole = transfer.passed == transfer.count
-        self._whole = (transfer.partner, transfer.part, transfer.count) if whole else None
+        self._whole = (*transfer.whose, transfer.count) if whole else None
         number = self.number(transfer.part) if result == MavResult.ACCEPTED else 0
-        return [messages.MissionAck(transfer.partner, transfer.part, result, number)]
+        return [messages.MissionAck(*transfer.whose, result, number)]
 
     def _in_place(self, part: MissionType) -> bool:
         return not self._dialect.atomic and part is not MissionType.FENCE
@@ -289,5 +293,55 @@ def _warning(text: str) -> Message:
     return messages.Statustext(MavSeverity.WARNING, text)
 
 
-def _ack(to: Address, mission_type: int, result: MavResult) -> list[Message]:
-    return [messages.MissionAck(to, mission_type, result)]
+class ParameterServer:
+    """Parameters of `vehicle` by name, in the autopilot's own units.
+
+    Those whose default is an `int` are whole numbers; `given` are other values than the `defaults`.
+    Of the names that one parameter has it knows the oldest that is given. An autopilot that sends
+    whole numbers as their bits sets nothing that comes with another type than it has.
+    """
+
+    def __init__(
+        self, defaults: Mapping[str, float], given: Mapping[str, float], vehicle: VehicleType
+    ) -> None:
+        self._vehicle = vehicle
+        self.values: dict[str, float] = {
+            name: type(defaults.get(name, value))(value)
+            for name, value in {**defaults, **given}.items()
+        }
+        for parameter in vehicle.parameters.values():
+            known = [name for name in parameter.names if name in given]
+            for other in {*parameter.names} - {*known[-1:]} if known else ():
+                self.values.pop(other, None)
+
+    def on(
+        self, message: messages.ParamRequestList | messages.ParamRequestRead | messages.ParamSet
+    ) -> list[Message]:
+        """Return the answer to a request; unknown names get none."""
+        names = list(self.values)
+        match message:
+            case messages.ParamRequestRead(param_index=index) if index != -1:
+                names = names[index : index + 1] if index >= 0 else []
+            case messages.ParamRequestRead(param_id=name):
+                names = [name] if name in self.values else []
+            case messages.ParamSet(param_id=name):
+                names = [name] if self._takes(message) else []
+        return [self._told(name) for name in names]
+
+    def _takes(self, message: messages.ParamSet) -> bool:
+        """Set a parameter; tell whether it is one, whatever became of its value."""
+        name, value = message.param_id, value_in(message, self._vehicle)
+        strict = self._vehicle.family.whole_as_bits
+        if name not in self.values or (strict and message.param_type != self._kind(name)):
+            return False
+        if math.isfinite(value):
+            self.values[name] = type(self.values[name])(value)
+        return True
+
+    def _kind(self, name: str) -> int:
+        return _INT32 if isinstance(self.values[name], int) else _REAL32
+
+    def _told(self, name: str) -> Message:
+        index, kind = list(self.values).index(name), self._kind(name)
+        number = carried(float(self.values[name]), kind, self._vehicle)
+        return messages.ParamValue(name, number, kind, len(self.values), index)
