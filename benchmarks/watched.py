@@ -17,10 +17,9 @@ from pathlib import Path
 from flown import FLOWN, serving
 
 from faao_mav import Result, plan_mission
-from faao_mav.fly.fly import fly_mission
+from faao_mav.fly.fly import Telling, fly_mission
 from faao_mav.fly.logs import read_log
 from faao_mav.fly.preflight import Flight
-from faao_mav.fly.telling import Telling
 from faao_mav.report.debrief import FromLog
 from faao_mav.validate.flown import Debriefing
 from missions import plan_of

@@ -11,7 +11,7 @@ import pytest
 from conftest import SMALL, MakePlan, edited
 
 from faao_mav.errors import PlanError
-from faao_mav.fly.telling import Radios
+from faao_mav.fly.fly import Radios
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize

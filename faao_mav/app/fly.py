@@ -11,7 +11,7 @@ from nicegui import events, ui
 
 from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watched
 from faao_mav.app.workers import Workers, said, talk
-from faao_mav.fly.telling import as_text
+from faao_mav.fly.fly import as_text
 from faao_mav.workflow import Result
 
 _LARGEST_LOG = 2**30

@@ -86,9 +86,8 @@ def watched(tell: Tell, look: Callable[[], None], result: Result, connection: st
     It is `faao-mission fly` without --arm: see `faao_mav.fly.fly`, and what that raises. `tell` is
     given what a `Telling` says; `look` raises KeyboardInterrupt to leave the flight.
     """
-    from faao_mav.fly.fly import fly_mission
+    from faao_mav.fly.fly import Telling, fly_mission
     from faao_mav.fly.preflight import Flight
-    from faao_mav.fly.telling import Telling
     from faao_mav.fly.watch import Watch
     from faao_mav.report.debrief import flight_lines
 

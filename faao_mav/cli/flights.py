@@ -53,10 +53,9 @@ def fly(
     """
     from faao_mav.autopilot.files import made_for
     from faao_mav.cli.vehicle import choose_vehicle
-    from faao_mav.fly.fly import fly_mission
+    from faao_mav.fly.fly import HEADER, Radios, Telling, as_text, fly_mission
     from faao_mav.fly.preflight import Flight
     from faao_mav.fly.telemetry import POSITION_RATE
-    from faao_mav.fly.telling import HEADER, Radios, Telling, as_text
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.summary import joined
     from faao_mav.validate import predicted
@@ -147,8 +146,8 @@ def debrief(
         raise InputError("--plan or --solution: give the plan that was flown")
     inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     cli.check_outputs({"--report": report}, inputs)
+    from faao_mav.fly.fly import Radios
     from faao_mav.fly.logs import read_log
-    from faao_mav.fly.telling import Radios
     from faao_mav.report.debrief import FromLog
     from faao_mav.report.summary import joined
     from faao_mav.workflow import Result, with_mission

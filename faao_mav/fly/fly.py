@@ -1,21 +1,43 @@
-"""Watch the flight of a mission that a vehicle holds: compare it with the file, then follow it."""
+"""Flying: a vehicle is watched, and people, programs and radios are told of its flight."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Unpack
+import json
+import socket
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import Any, Unpack
 
-from faao_mav.errors import LinkError
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
+from faao_mav.autopilot import Track
+from faao_mav.errors import InputError, LinkError
 from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import POSITION_RATE, Ending, read_held
-from faao_mav.fly.watch import Watch
-from faao_mav.validate.flown import FlightRecord
-from faao_mav.validate.rule import Finding
+from faao_mav.fly.watch import BEFORE, Watch
+from faao_mav.optimizer.solution import Solution
+from faao_mav.schedule.precoder_table import check_of_slots, taken_by
+from faao_mav.validate import flown
+from faao_mav.validate.comparison import predicted_line
+from faao_mav.validate.flown import Debriefing, FlightRecord, Line
+from faao_mav.validate.rule import Finding, Level, by_rule, count_of, line_of
+from faao_mav.vector import lengths
 from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.verify import Difference
 from faao_mav.wire.wire_items import wire_items
+
+_NEAR = 20.0
+"""Before the plan's clock is known slots are told within so many metres of flight.start; chosen."""
+
+_PERIOD = 1.0
+"""Seconds between two lines, by the world's clock and by the vehicle's (a simulator's is quick)."""
+
+_NO_VOLTAGE = 65_535
+"""What SYS_STATUS says of a voltage that is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,3 +115,204 @@ def fly_mission(
             ending = Ending("lost", str(error))
     found = gate.findings or ()
     return FlightReport(vehicle, (), ending, watch.seen.record(), watch.relay_start, found)
+
+
+class Radios:
+    """Radios that take lines as datagrams at `to`, udp:HOST:PORT, in a flight of `solution`.
+
+    They are told a slot whenever another is reached. By what slots are taken `taken_by` says: by
+    time, or by place, of the slots planned there the one whose time is nearest. A radio that does
+    not listen is no reason to stop a flight: what cannot be sent is dropped. Raises `InputError`
+    for another `to`, and as `check_of_slots` does.
+    """
+
+    def __init__(self, solution: Solution, to: str) -> None:
+        kind, _, where = to.partition(":")
+        host, _, port = where.rpartition(":")
+        if kind != "udp" or not host or not port.isdecimal() or not 0 < int(port) < 65_536:
+            raise InputError(f"--radio {to}: expected udp:HOST:PORT, as in udp:127.0.0.1:5005")
+        check_of_slots(solution)
+        self._solution, self._to, self._last = solution, (host, int(port)), -1
+
+    def line(self, t: float | None, w: Real) -> str | None:
+        """Return the line of the slot of an aircraft at `w` (2,), m, if it is another than before.
+
+        `t` is the time on the plan's clock, s; None while that is not known: then slots are taken
+        by place while it is near flight.start. None, too, before and after the plan's time.
+
+        It is a JSON object: `slot`; `t`, s; `east` and `north`, m, where the aircraft is; `P_B` and
+        `P_U`, rows of [real, imaginary], sqrt(W); `receive_share`, null in full duplex; `step_B`
+        and `step_U`, the numbers of the rates of both hops, null without `radio.rates`.
+        """
+        solution, plan = self._solution, self._solution.plan
+        away = float(lengths(w - solution.w[0]))
+        if not (away <= _NEAR if t is None else 0 <= t < plan.flight.duration):
+            return None
+        planned = now = 0.0 if t is None else t
+        if t is None or taken_by(plan) == "place":
+            planned -= flown.late(solution, now, w)
+        step = float(solution.t[1] - solution.t[0])
+        slot = min(int(max(planned, 0.0) / step + 1e-9), len(solution.t) - 1)
+        if slot == self._last:
+            return None
+        self._last = slot
+        told = {
+            "slot": slot,
+            "t": t,
+            "east": float(w[0]),
+            "north": float(w[1]),
+            "P_B": _pairs(solution.P_B[slot]),
+            "P_U": _pairs(solution.P_U[slot]),
+            "receive_share": None if solution.shares is None else float(solution.shares[slot]),
+            "step_B": None if solution.steps is None else int(solution.steps[0][slot]),
+            "step_U": None if solution.steps is None else int(solution.steps[1][slot]),
+        }
+        return json.dumps(told)
+
+    def tell(self, t: float | None, w: Real) -> bool:
+        """Send the line of that slot, if it is another one; tell whether it is."""
+        line = self.line(t, w)
+        if line is not None:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link, suppress(OSError):
+                link.sendto(f"{line}\n".encode(), self._to)
+        return line is not None
+
+    def replay(self, flight: Line) -> int:
+        """Tell the slots of a `flight` on the plan's clock at the pace at which it was flown.
+
+        Return how many there were.
+        """
+        begin, count = time.monotonic(), 0
+        during = (flight.t >= 0) & (flight.t < self._solution.plan.flight.duration)
+        times = flight.t[during].tolist()
+        for t, w in zip(times, flight.w[during], strict=True):
+            time.sleep(max(0.0, begin + t - times[0] - time.monotonic()))
+            count += self.tell(t, w)
+        return count
+
+
+def _pairs(P: Complex) -> list[list[list[float]]]:
+    pairs: list[list[list[float]]] = np.stack([P.real, P.imag], axis=-1).tolist()
+    return pairs
+
+
+class Telling:
+    """Tells what a watch sees: called after its every step, it says what is new.
+
+    `say` is given events, {"note": text}, of which one has "findings" too, what the gate before the
+    flight found, and once a second how the flight stands: where the vehicle is, and beside
+    `solution`, of which `track` is the predicted flight, how late it is and what it delivers.
+    `radios` are told the slots of `solution` meanwhile.
+    """
+
+    def __init__(
+        self,
+        solution: Solution | None,
+        track: Track | None,
+        radios: Radios | None,
+        say: Callable[[dict[str, Any]], object],
+    ) -> None:
+        self._solution, self._radios, self._say = solution, radios, say
+        self._line = None if solution is None else predicted_line(solution, track)
+        self._start: float | None = None
+        self._told, self._heard, self._next, self._last = 0, 0, 0.0, -_PERIOD
+        self._found: tuple[Finding, ...] | None = None
+
+    def __call__(self, watch: Watch) -> None:
+        """Say what has happened since the last call, and once a second how the flight stands."""
+        seen, found, fixes = watch.seen, watch.gate.findings, watch.seen.fixes
+        if found is not None and found != self._found:
+            self._found = found
+            self._say({"note": findings_text(found), "findings": [asdict(each) for each in found]})
+        for text in seen.told[self._told :]:
+            self._say({"note": text})
+        self._told = len(seen.told)
+        start = self._start if watch.relay_start is None else watch.relay_start
+        if self._radios is not None and self._solution is not None and len(fixes) > self._heard:
+            self._heard = len(fixes)
+            place = FlightRecord.of(fixes[-1]).line(self._solution).w[0]
+            self._radios.tell(None if start is None else fixes[-1].t - start, place)
+        now = time.monotonic()
+        ready = seen.heartbeat is not None and fixes and fixes[-1].t >= self._last + _PERIOD
+        if ready and now >= self._next:
+            self._next, self._last = now + _PERIOD, fixes[-1].t
+            self._say(self._row(watch))
+
+    def debriefing(self, report: FlightReport) -> Debriefing | None:
+        """Return what became of the plan; None without one, or without its flight."""
+        if self._solution is None or self._line is None or not len(report.record.t):
+            return None
+        return flown.debriefing(self._solution, self._line, report.record, report.relay_start)
+
+    def _row(self, watch: Watch) -> dict[str, Any]:
+        """Return a line of `--json`: s, degrees, m, V, percent, bit/s/Hz, bit/Hz and 10^6 bytes."""
+        seen, last = watch.seen, watch.seen.fixes[-1]
+        volts = _NO_VOLTAGE if seen.status is None else seen.status.voltage_battery
+        return {
+            "t": last.t,
+            "phase": watch.phase,
+            "mode": seen.mode,
+            "item": seen.row,
+            "latitude": last.latitude,
+            "longitude": last.longitude,
+            "height": seen.height,
+            "volts": None if volts == _NO_VOLTAGE else volts / 1000,
+            "battery": seen.battery,
+            "plan": self._standing(watch),
+        }
+
+    def _standing(self, watch: Watch) -> dict[str, Any] | None:
+        """Return how the flight stands; None before it has left w_I, and when it is over."""
+        solution = self._solution
+        if solution is None or self._line is None or watch.phase in BEFORE:
+            return None
+        record, start = watch.seen.record(), watch.relay_start
+        if start is None and not watch.streams:
+            self._start = start = flown.plan_start(solution, self._line, record.line(solution))
+        if start is None:
+            return None
+        stands = flown.standing(solution, self._line, record.line(solution, start))
+        if stands.over:
+            return None
+        told = asdict(stands)
+        for name in ("delivered", "expected"):
+            rate = told[name] / solution.plan.flight.duration
+            told[f"{name}_mbytes"] = solution.plan.megabytes(rate)
+        return told
+
+
+def findings_text(findings: Sequence[Finding]) -> str:
+    """Return what the gate before a flight found, for people: a line for each rule."""
+    lines = [f"before the flight: {', '.join(count_of(findings, level) for level in Level)}"]
+    for group in by_rule(findings):
+        action = f"; to do: {group[0].action}" if group[0].action else ""
+        lines.append(f"   {line_of(group)}{action}")
+    return "\n".join(lines)
+
+
+HEADER = "    plan  mode      item   height     late  off plan  off path  to UAV  to user  arrived"
+"""What the columns of `as_text` are: the plan's clock, s, the mode, the item under way, m above
+home, how late against the plan, how far from it now and from its path, both hops' rates now,
+bit/s/Hz, and what is delivered so far of what is expected by the end."""
+
+
+def as_text(told: dict[str, Any]) -> str:
+    """Return what a `Telling` says for people: an event, or a row of the table under `HEADER`."""
+    if "note" in told:
+        return f"-- {told['note']}"
+    plan, item = told["plan"], "?" if told["item"] is None else told["item"]
+    clock = f"{plan['time']:6.1f} s" if plan is not None else f"{'-':>8}"
+    parts = [clock, f"{told['mode']:<8}", f"{item:>4}", f"{told['height']:5.1f} m"]
+    if plan is not None:
+        unit, suffix = ("bit/Hz", "") if plan["expected_mbytes"] is None else ("MB", "_mbytes")
+        parts += [
+            f"{plan['late']:+5.1f} s",
+            f"{plan['apart']:6.1f} m",
+            f"{plan['astray']:6.1f} m",
+            f"{plan['I_U']:6.2f}",
+            f"{plan['I_G']:7.2f}",
+            f"{plan['delivered' + suffix]:.1f} of {plan['expected' + suffix]:.1f} {unit}",
+        ]
+    if told["battery"] is not None:
+        parts.append(f"battery {told['battery']} %")
+    return "  ".join(parts)

@@ -10,7 +10,7 @@ from faao_mav.fly.itinerary import LEVEL, Itinerary
 from faao_mav.fly.preflight import Clearance
 from faao_mav.fly.setpoints import OwnClock, OwnFrame, Setpoint, at_rest
 from faao_mav.fly.telemetry import PATIENCE
-from faao_mav.fly.watch import ACCEPTED, Order, Watch
+from faao_mav.fly.watch import Order, Watch
 from faao_mav.wire import messages
 from faao_mav.wire.messages import Message
 from faao_mav.wire.protocol import CURRENT_MODE, LOCAL_ORIGIN, MavCommand
@@ -115,11 +115,6 @@ class Stream(Watch):
         return late if age > _OLD else super()._lacks(now)
 
     # ---- who flies it
-
-    def _answered(self, order: Order, result: int, now: float) -> None:
-        if self.phase == "starting" and result == ACCEPTED:
-            self._begin()
-        super()._answered(order, result, now)
 
     def _begin(self) -> None:
         super()._begin()

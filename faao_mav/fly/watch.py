@@ -27,7 +27,7 @@ _AGAIN, _TRIES = 1.5, 5
 """Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
 guide has it for missions."""
 
-ACCEPTED, _IN_PROGRESS = 0, 5
+_ACCEPTED, _IN_PROGRESS = 0, 5
 """MAV_RESULT."""
 
 _TICK, _REBOOT = 0.5, 1.5
@@ -252,7 +252,7 @@ class Watch(Machine[Ending]):
         the checks did not ask for before: what is said about it is waited for.
         """
         order.answer = f"answers {order.command.name} with {command_result(result)}"
-        accepted = result == ACCEPTED
+        accepted = result == _ACCEPTED
         order.refusals += not accepted
         match self.phase:
             case "arming" if accepted:
@@ -263,6 +263,8 @@ class Watch(Machine[Ending]):
                 order.sent, order.due = _TRIES, now + _WORDS
             case "starting" if not accepted:
                 self._refused(order, now)
+            case "starting" if self.streams:
+                self._begin()
             case "disarming" if order.refusals == _TRIES:
                 self._leave_armed(f"it {order.answer}")
 

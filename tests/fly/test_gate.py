@@ -93,7 +93,7 @@ def test_from_wherever_it_is_found_again_it_is_led_to_the_end_inside_the_fence(
     assert (flight.trouble, flight.part) == (None, "over")
     assert np.linalg.norm(places[-1] - flight.relay.p[-1]) < NEAR + 1e-6
     path = np.vstack([place[None], places[times >= begin + lasting - 1e-9]])
-    kept = np.array([area.inside(2.98).covers(each[None, :2]).all() for each in path])
+    kept = area.inside(2.98).covers(path[:, :2])
     assert kept[np.argmax(kept) :].all()
     steps = np.diff(path, axis=0)
     assert np.hypot(steps[:, 0], steps[:, 1]).max() <= CAP

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 from faao_mav import optimize, parse_plan
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError
-from faao_mav.fly.telling import Radios
+from faao_mav.fly.fly import Radios
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.flown import Line
 
@@ -108,7 +108,7 @@ def test_a_log_is_replayed_to_a_radio_at_its_pace(monkeypatch: pytest.MonkeyPatc
     clock = SimpleNamespace(
         monotonic=lambda: now[0], sleep=lambda seconds: now.__setitem__(0, now[0] + seconds)
     )
-    monkeypatch.setattr("faao_mav.fly.telling.time", clock)
+    monkeypatch.setattr("faao_mav.fly.fly.time", clock)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
         radio.bind(("127.0.0.1", 0))
         radio.settimeout(5)
