@@ -71,7 +71,7 @@ def fly_mission(
 ) -> FlightReport:
     """Watch the vehicle at `connection` fly the mission of `flight`, which it has to hold already.
 
-    It is armed and started only with `arm`, and only where `preflight` finds no error; for
+    It is armed and started only with `arm`, and only where a `Clearance` finds no error; for
     `elsewhere` and `untimed` see there. `lands` tells whether the flight ends on the ground. A
     flight that is `streamed` is armed and flown by setpoints instead of its mission: see `Stream`,
     and what that raises. `rate` is how many positions it is asked for a second. `watching` is
@@ -101,8 +101,7 @@ def fly_mission(
             wrong += held.other_than(sent, part, peer.vehicle) if sent else ()
         if wrong:
             return FlightReport(vehicle, tuple(wrong), None, FlightRecord.of(()))
-        allowed = {"elsewhere": elsewhere, "untimed": untimed}
-        gate = Clearance(flight, peer, held, judged=judged, **allowed)
+        gate = Clearance(flight, peer, held, elsewhere, untimed, judged)
         if flight.streamed and flight.solution is not None:
             watch: Watch = Stream(gate, rate=rate)
         else:

@@ -1,6 +1,6 @@
 """What is to be flown, and the gate before it: against what is held and seen of the vehicle.
 
-Nothing is armed while `preflight` finds an error. It is one gate for missions and for setpoints.
+Nothing is armed while a `Clearance` finds an error. It is one gate for missions and for setpoints.
 """
 
 import math
@@ -95,28 +95,24 @@ class Flight:
         return replace(self.mission, home=home)
 
 
+@dataclass(slots=True, eq=False)
 class Clearance:
-    """Whether the vehicle of `peer`, which `held` this, is clear for `flight`: see `preflight`.
+    """Whether the vehicle of `peer`, which `held` this, is clear for `flight`: without an error.
 
-    `findings` is what that has found last; None before enough is heard of the vehicle, and of one
-    that is not `judged`.
+    `elsewhere` allows another place than the mission was made for, `untimed` other parameters than
+    it is timed for; what they overrule is told as a warning. `findings` is what was found last;
+    None before enough is heard of the vehicle, and of one that is not `judged`.
     """
 
-    def __init__(
-        self,
-        flight: Flight,
-        peer: Peer,
-        held: Held,
-        *,
-        judged: bool = True,
-        elsewhere: bool = False,
-        untimed: bool = False,
-    ) -> None:
-        self.flight, self.peer, self.held = flight, peer, held
-        self.findings: tuple[Finding, ...] | None = None
-        self.reading: Script[Held] | None = None
-        self._is_judged, self._elsewhere, self._untimed = judged, elsewhere, untimed
-        self._state: tuple[object, ...] = ()
+    flight: Flight
+    peer: Peer
+    held: Held
+    elsewhere: bool = False
+    untimed: bool = False
+    judged: bool = True
+    findings: tuple[Finding, ...] | None = None
+    reading: Script[Held] | None = None
+    _state: tuple[object, ...] = ()
 
     def judge(self, seen: Telemetry, now: float, *, again: bool = False) -> None:
         """Look, once enough is heard, and `again` or when that is another state."""
@@ -124,9 +120,33 @@ class Clearance:
         heard = seen.heartbeat is not None and (known or now >= seen.begun + _LOOK)
         others = len(seen.stations), len(seen.strangers)
         state = seen.place is None, seen.armed, seen.custom_mode, seen.row, others
-        if self._is_judged and heard and (again or state != self._state):
-            allowed = {"elsewhere": self._elsewhere, "untimed": self._untimed}
-            self._state, self.findings = state, preflight(self.flight, self.held, seen, **allowed)
+        if self.judged and heard and (again or state != self._state):
+            self._state, self.findings = state, self.found(seen)
+
+    def found(self, seen: Telemetry) -> tuple[Finding, ...]:
+        """Return what stands against the flight by what it holds, and was `seen` of it."""
+        flight, held = self.flight, self.held
+        mistake = addressee_mistake(flight.made_for, seen.vehicle)
+        if mistake is not None:
+            return (_found("vehicle-other", mistake=mistake),)
+        judged = _judged(flight, held, seen, elsewhere=self.elsewhere)
+        found = [
+            *_state(flight, seen),
+            *_place(flight, held, seen),
+            *_lists(flight, held, seen, judged.vehicle),
+            *_timing(flight, held, seen, judged),
+            *_battery(seen, judged),
+            *(each for each in judged.findings if each.level is not Level.NOTE),
+            *_by_itself(flight, held, seen, judged.vehicle),
+        ]
+        allowed = {"place-": "--elsewhere"} if self.elsewhere else {}
+        allowed |= {"timing-": "--untimed"} if self.untimed else {}
+        for rules, option in allowed.items():
+            for k, each in enumerate(found):
+                if each.level is Level.ERROR and each.rule.startswith(rules):
+                    action = f"{option}: flown all the same"
+                    found[k] = replace(each, level=Level.WARNING, action=action)
+        return tuple(sorted(found, key=lambda each: [*Level].index(each.level)))
 
     @property
     def is_clear(self) -> bool:
@@ -154,38 +174,6 @@ class Clearance:
             return self.reading.tick(now)
         self.held = self.reading.outcome
         return None
-
-
-def preflight(
-    flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool = False, untimed: bool = False
-) -> tuple[Finding, ...]:
-    """Return what stands against `flight` by a vehicle that `held` this and was `seen` so.
-
-    An error means that it is not armed. `elsewhere` allows another place than the mission was made
-    for, `untimed` other parameters than it is timed for; what they overrule is told as a warning.
-    """
-    mistake = addressee_mistake(flight.made_for, seen.vehicle)
-    if mistake is not None:
-        return (_found("vehicle-other", mistake=mistake),)
-    judged = _judged(flight, held, seen, elsewhere=elsewhere)
-    found = [
-        *_state(flight, seen),
-        *_place(flight, held, seen),
-        *_lists(flight, held, seen, judged.vehicle),
-        *_timing(flight, held, seen, judged),
-        *_battery(seen, judged),
-        *(each for each in judged.findings if each.level is not Level.NOTE),
-        *_by_itself(flight, held, seen, judged.vehicle),
-    ]
-    for rules, option, given in (
-        ("place-", "--elsewhere", elsewhere),
-        ("timing-", "--untimed", untimed),
-    ):
-        for k, each in enumerate(found):
-            if given and each.level is Level.ERROR and each.rule.startswith(rules):
-                action = f"{option}: flown all the same"
-                found[k] = replace(each, level=Level.WARNING, action=action)
-    return tuple(sorted(found, key=lambda each: [*Level].index(each.level)))
 
 
 def _found(row: str, level: Level | None = None, rule: str = "", **values: object) -> Finding:

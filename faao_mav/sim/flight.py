@@ -266,10 +266,9 @@ class Flight:
 
     def is_outside(self, fence: Fence, place: Real) -> bool:
         """Tell whether `place`, m from home, is outside a `fence` that it does something about."""
-        vehicle = self.vehicle
-        if not fence or self._type.at_fence(vehicle).action == "nothing":
+        if not fence or self._type.at_fence(self.vehicle).action == "nothing":
             return False
-        any_inclusion = self._type.fence_needs_one_inclusion(vehicle)
+        any_inclusion = self._type.fence_needs_one_inclusion(self.vehicle)
         area = FreeArea.of(areas_of(fence, self._frame), any_inclusion=any_inclusion)
         return not area.covers(place[None, :2]).all()
 

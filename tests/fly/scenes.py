@@ -39,30 +39,6 @@ METRE = 1e7 / 111_319.5
 LOITER = 5
 """A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
 
-LOW: dict[str, Any] = {
-    "flight.start_velocity": "hover",
-    "flight.end_velocity": "hover",
-    "flight.altitude": 6,
-    "flight.duration": 16,
-    "vehicle.max_speed": 6,
-    "vehicle.max_acceleration": 2.5,
-    "mission.on_finish": "land",
-}
-
-SWIFT: dict[str, Any] = {
-    "flight.start_velocity": "hover",
-    "flight.end_velocity": "hover",
-    "flight.start": [0, 50],
-    "flight.end": [200, 0],
-    "flight.altitude": 30,
-    "flight.duration": 32,
-    "vehicle.max_speed": 8,
-    "vehicle.max_acceleration": 1.6,
-    "radio.ground_user.position": [220, 60],
-    "mission.on_finish": "land",
-}
-"""A plan that never waits: 8 m/s for most of 206 m, 30 m above the ground."""
-
 ZONE = {
     "margin": 3,
     "inclusion": [[-40, -60], [260, -60], [260, 120], [-40, 120]],
@@ -73,29 +49,49 @@ ZONE = {
 CAP = NEAR + 8**2 / (2 * 1.6)
 """The farthest, m, that the gate lets that flight be sent."""
 
+RESTS = {
+    "flight.start_velocity": "hover",
+    "flight.end_velocity": "hover",
+    "mission.on_finish": "land",
+}
+LOW: dict[str, Any] = RESTS | {
+    "flight.altitude": 6,
+    "flight.duration": 16,
+    "vehicle.max_speed": 6,
+    "vehicle.max_acceleration": 2.5,
+}
+SWIFT: dict[str, Any] = RESTS | {
+    "flight.start": [0, 50],
+    "flight.end": [200, 0],
+    "flight.altitude": 30,
+    "flight.duration": 32,
+    "vehicle.max_speed": 8,
+    "vehicle.max_acceleration": 1.6,
+    "radio.ground_user.position": [220, 60],
+}
+SHORT = {"flight.end": [50, 0], "flight.duration": 50, "radio.ground_user.position": [60, 60]}
+PLANS: dict[str, dict[str, Any]] = {
+    "low": LOW,
+    "hovers": LOW | {"mission.on_finish": "hover"},
+    "away": LOW | {"site.origin.latitude": HOME.latitude + 0.001},
+    "swift": SWIFT,
+    "fenced": SWIFT | {"fence": ZONE, "flight.duration": 36},
+    "waiting": SWIFT | SHORT,
+}
+"""Flights by setpoints: a low one of 16 s at up to 6 m/s, which may hover at its end, or begin away
+from where the vehicle stands; a swift one, which flies 8 m/s for most of 206 m, with a zone across
+its straight or without; and one that waits in the middle."""
+
 
 @cache
-def low() -> Solution:
-    """Return the small plan solved: 16 s at up to 6 m/s, 6 m above home."""
-    return optimize(parse_plan(edited(FLYABLE, LOW)))
+def planned(flight: str) -> Solution:
+    return optimize(parse_plan(edited(FLYABLE, PLANS[flight])))
 
 
 def under(changes: dict[str, Any]) -> Solution:
-    """Return the same flight for a plan that has what does not change it otherwise."""
-    return replace(low(), problem=build_problem(parse_plan(edited(FLYABLE, LOW | changes))))
-
-
-@cache
-def swift(*, fenced: bool = False) -> Solution:
-    changes = SWIFT | ({"fence": ZONE, "flight.duration": 36} if fenced else {})
-    return optimize(parse_plan(edited(FLYABLE, changes)))
-
-
-@cache
-def waiting() -> Solution:
-    """Return a plan of 50 s for the small flight, which hovers in the middle."""
-    slow = {"flight.end": [50, 0], "flight.duration": 50, "radio.ground_user.position": [60, 60]}
-    return optimize(parse_plan(edited(FLYABLE, SWIFT | slow)))
+    """Return the low flight for a plan that has what does not change it otherwise."""
+    plan = parse_plan(edited(FLYABLE, LOW | changes))
+    return replace(planned("low"), problem=build_problem(plan))
 
 
 def away(metres: float, higher: float = 0.0) -> Home:
@@ -172,8 +168,7 @@ class Scene:
         for part in MissionType:
             self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        allowed = {"elsewhere": elsewhere, "untimed": untimed}
-        gate = Clearance(flight, peer_of(kind), held_by(self.mock), **allowed)
+        gate = Clearance(flight, peer_of(kind), held_by(self.mock), elsewhere, untimed)
         self.watch: Any = Stream(gate) if solution else Watch(gate, arm=arm, lands=lands)
         self.client, self.solution = Counted(self.watch), solution
         self.times, self.sent, self.places = list[float](), list[Real](), list[Real]()

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 from scenes import (
     METRE,
+    PLANS,
     AnotherStation,
     Companion,
     Lens,
@@ -14,17 +15,13 @@ from scenes import (
     arms,
     away,
     is_setpoint,
-    low,
+    planned,
     starts,
-    swift,
-    waiting,
 )
-from scenes import under as with_plan
 from simulate import Station
 from stations import FOREIGN, HOME, RALLY, a_mission, rows_for, vehicle_of
 
 from faao_mav.mission import Mission, MissionItem
-from faao_mav.optimizer.solution import Solution
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages
 from faao_mav.wire.messages import Envelope, Message
@@ -51,14 +48,6 @@ FAR = MissionItem(16, 3, x=HOME.latitude + 0.01, y=HOME.longitude, z=30.0)
 MISSIONS = {
     "far": Mission((a_mission(3).items[0], FAR, MissionItem(20, 2)), HOME),
     "hovering": Mission(a_mission(12).items[:-1], HOME),
-}
-PLANS: dict[str, Callable[[], Solution]] = {
-    "low": low,
-    "swift": swift,
-    "fenced": lambda: swift(fenced=True),
-    "waiting": waiting,
-    "hovers": lambda: with_plan({"mission.on_finish": "hover"}),
-    "away": lambda: with_plan({"site.origin.latitude": HOME.latitude + 0.001}),
 }
 Picks: TypeAlias = Callable[[Message], bool]
 PICKED: dict[str, Picks] = {
@@ -145,7 +134,7 @@ def staged(flies: str, kind: str, given: Mapping[str, str], happens: str = "") -
     scene = Scene(
         kind,
         MISSIONS.get(flies),
-        solution=PLANS[flies]() if flies in PLANS else None,
+        solution=planned(flies) if flies in PLANS else None,
         arm=flies not in (*PLANS, "watch"),
         lands=flies != "hovering",
         elsewhere="elsewhere" in given,

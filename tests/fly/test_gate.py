@@ -8,7 +8,7 @@ import numpy as np
 from conftest import FLYABLE, edited
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import CAP, SWIFT, ZONE, swift
+from scenes import CAP, SWIFT, ZONE, planned
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
@@ -82,7 +82,7 @@ def carried(
 def test_from_wherever_it_is_found_again_it_is_led_to_the_end_inside_the_fence(
     place: Real, begin: float, lasting: float
 ) -> None:
-    solution = swift(fenced=True)
+    solution = planned("fenced")
     area = solution.plan.keep_in
     assert area is not None
     flight, times, places = carried(solution, place, (begin, begin + lasting))
@@ -106,23 +106,21 @@ def test_from_wherever_it_is_found_again_it_is_led_to_the_end_inside_the_fence(
 
 
 def test_it_meets_the_plan_where_that_waits() -> None:
-    """A plan of a minute for the small flight hovers in the middle: there it is met in time."""
-    slow = {"flight.end": [50, 0], "flight.duration": 60, "radio.ground_user.position": [60, 60]}
-    solution, told = optimize(plan_with(slow)), list[str]()
+    solution, told = planned("waiting"), list[str]()
     flight, times, places = carried(solution, np.array([-60.0, 0.0, 30.0]), (40.0, 42.0), told)
     assert flight.part == "over"
     assert flight.relay_start is not None
     assert told[2:4] == ["it is off its flight, and led back to it", "it is on its plan again"]
     late = times > flight.relay_start + 30
     on_plan = late & (times < flight.relay_start + solution.plan.flight.duration)
-    planned = np.array([flight.relay.at(t - flight.relay_start).position for t in times[on_plan]])
-    assert np.linalg.norm(places[on_plan] - planned, axis=1).max() < 1e-6
+    meant = np.array([flight.relay.at(t - flight.relay_start).position for t in times[on_plan]])
+    assert np.linalg.norm(places[on_plan] - meant, axis=1).max() < 1e-6
 
 
 def test_an_aircraft_that_does_not_follow_is_given_up() -> None:
     """It stays where it is, or a wind drifts it off again and again."""
     for drift in (0.0, -8.0):
-        solution, t, place = swift(), 0.0, np.array([0.0, 0.0, 30.0])
+        solution, t, place = planned("swift"), 0.0, np.array([0.0, 0.0, 30.0])
         flight = Itinerary(solution, print, takes_off=True)
         while flight.trouble is None and flight.part != "over" and t < 900:
             t += 0.1

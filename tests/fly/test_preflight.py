@@ -27,7 +27,7 @@ from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, v
 from faao_mav import parse_plan, plan_mission
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor
-from faao_mav.fly.preflight import Flight, preflight
+from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.telemetry import Telemetry
 from faao_mav.mission import Home, Mission
 from faao_mav.mission.fence import Circle, Fence
@@ -85,7 +85,8 @@ def found(flight: Flight, mock: MockAutopilot, told: Mapping[str, str]) -> dict[
         part = MissionType[told["unread"].upper()]
         lists = {each: rows for each, rows in held.lists.items() if each is not part}
         held = replace(held, lists=lists, missing={part: PartReport(part, "silent")})
-    seen = Telemetry(peer_of(mock.behaviour.family.key), ())
+    peer = peer_of(mock.behaviour.family.key)
+    seen = Telemetry(peer, ())
     stands = told.get("stands", "0")
     seen.place = PLACES[stands] if stands in PLACES else away(*map(float, stands.split(",")))
     seen.stations = {"system 250, component 190"} if "station" in told else set()
@@ -93,8 +94,8 @@ def found(flight: Flight, mock: MockAutopilot, told: Mapping[str, str]) -> dict[
     seen.status = SysStatus(0, 0, int(told.get("battery", 100)))
     autopilot, armed = mock.vehicle.family.mav_autopilot, 128 * ("armed" in told)
     seen.heartbeat = Heartbeat(2, autopilot, armed | 1, int(told.get("mode", mock.mode)), 4)
-    allowed = {name: name in told for name in ("elsewhere", "untimed")}
-    return {each.rule: each for each in preflight(flight, held, seen, **allowed)}
+    gate = Clearance(flight, peer, held, "elsewhere" in told, "untimed" in told)
+    return {each.rule: each for each in gate.found(seen)}
 
 
 def errors(findings: Mapping[str, Finding]) -> set[str]:

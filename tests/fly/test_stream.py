@@ -7,7 +7,7 @@ import pytest
 from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import Scene, low, under
+from scenes import Scene, planned, under
 from stages import staged
 from stations import a_mission, peer_of, vehicle_of
 
@@ -47,7 +47,7 @@ def setpoints(scene: Scene) -> list[messages.SetPositionTargetLocalNed]:
 
 @pytest.mark.parametrize(("kind", "loss"), [("ardupilot", 0.0), ("px4", 0.0), ("px4", 0.2)])
 def test_a_plan_is_kept_in_time(kind: str, loss: float) -> None:
-    solution, scene = low(), staged("low", kind, {"loss": f"{loss}", "seed": "3"})
+    solution, scene = planned("low"), staged("low", kind, {"loss": f"{loss}", "seed": "3"})
     assert scene.run() == "finished"
     assert not scene.mock.armed
     found = flown(scene, solution)
@@ -66,7 +66,9 @@ def test_only_copters_are_flown_by_setpoints() -> None:
     peer = peer_of("ardupilot")
     plane = Peer(peer.own, peer.address, vehicle_type("ardupilot", "plane"))
     with pytest.raises(InputError, match="only copters"):
-        Stream(Clearance(Flight(a_mission(5), solution=low()), plane, Held({}, Reading({}))))
+        Stream(
+            Clearance(Flight(a_mission(5), solution=planned("low")), plane, Held({}, Reading({})))
+        )
 
 
 @pytest.mark.parametrize("finish", ["rtl", "hover"])

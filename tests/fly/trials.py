@@ -9,8 +9,8 @@ from random import Random
 from typing import Any, get_args
 
 import numpy as np
-from scenes import LOITER, Scene, arms, harmless
-from stages import PLANS, staged
+from scenes import LOITER, PLANS, Scene, arms, harmless
+from stages import staged
 from stations import VEHICLE, Counted
 
 from faao_mav.fly.itinerary import LEVEL, NEAR
