@@ -90,9 +90,7 @@ class Stream(Watch):
                 self._clock.hear(message, now)
             case messages.CurrentMode(custom_mode=mode) if in_flight:
                 self._on_mode(mode, now)
-            case messages.GlobalPositionInt() if (
-                self.outcome is None and message is self.seen.position
-            ):
+            case messages.GlobalPositionInt() if message is self.seen.position:
                 self._on_position(message, now)
 
     def _look(self, now: float) -> None:
@@ -174,7 +172,7 @@ class Stream(Watch):
     def _on_position(self, position: messages.GlobalPositionInt, now: float) -> None:
         t, place = position.time_boot_ms / 1000, self._frame.place(position)
         velocity = np.array([position.vy, position.vx, -position.vz]) / 100
-        if self._clock.age(t, now) > _OLD:
+        if self.outcome is not None or self._clock.age(t, now) > _OLD:
             return
         if self.phase == "starting" and place[2] > _OFF_GROUND:
             self._begin()

@@ -149,13 +149,10 @@ def test_every_kind_of_log_tells_the_flight(
     rssi = np.where(np.arange(len(flight.t)) % 4 == 1, 150.0, np.nan)
     rssi[5] = 255.0  # not known
     flight = replace(flight, rssi=rssi)
-    written = {
-        "bin": dataflash(flight, wind=wind, parameters=parameters),
-        "tlog": tlog(heard(flight, wind=wind, parameters=parameters)),
-        "ulg": ulog(flight, wind=wind, parameters=parameters),
-    }
+    writers: dict[str, Callable[..., bytes]] = {"bin": dataflash, "ulg": ulog}
+    writer = writers.get(kind, lambda *given, **more: tlog(heard(*given, **more)))
     log = tmp_path / f"flight.{kind.upper()}"
-    log.write_bytes(written[kind])
+    log.write_bytes(writer(flight, wind=wind, parameters=parameters))
     (record,) = read_log(log)
     assert record.t == pytest.approx(flight.t, abs=1e-6)
     for name in ("latitude", "longitude"):
