@@ -170,6 +170,7 @@ def test_the_vehicle_whose_flight_is_the_plans(flight: FlightRecord, tmp_path: P
     log.write_bytes(
         tlog(
             heard(idle, sender=(7, 1), wind=2 * wind, delay=-0.01),
+            heard(kept(idle, slice(5)), sender=(2, 0), wind=wind[:5]),
             heard(kept(flight, flight.t > 0), sender=(2, 191), wind=wind, delay=-0.005),
             heard(flight, sender=(2, 1)),
         )
