@@ -27,8 +27,7 @@ from faao_mav.vector import lengths
 from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.verify import Difference
-from faao_mav.wire.wire_items import wire_items
+from faao_mav.wire.wire_items import Difference, wire_items
 
 _NEAR = 20.0
 """Before the plan's clock is known slots are told within so many metres of flight.start; chosen."""

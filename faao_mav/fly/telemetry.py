@@ -12,15 +12,13 @@ from faao_mav.mission.item import Home
 from faao_mav.validate.flown import Fix, FlightRecord
 from faao_mav.wire import messages, protocol
 from faao_mav.wire.jobs import download_lists
-from faao_mav.wire.machine import Talk
+from faao_mav.wire.machine import Talk, ask_for
 from faao_mav.wire.messages import Envelope, Message, WireItem
 from faao_mav.wire.parameters import Reading, read_parameters
 from faao_mav.wire.protocol import MavCommand, MissionType
-from faao_mav.wire.questions import ask_for
 from faao_mav.wire.transfer import PartReport, Peer
-from faao_mav.wire.verify import Difference, compare
 from faao_mav.wire.whereabouts import home_in, place_in
-from faao_mav.wire.wire_items import home_items
+from faao_mav.wire.wire_items import Difference, compare, home_items
 
 Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"

@@ -22,7 +22,7 @@ from faao_mav.wire.jobs import (
     what_is_left,
 )
 from faao_mav.wire.link import Observe, WireLink
-from faao_mav.wire.machine import Talk
+from faao_mav.wire.machine import Talk, ask_alive, ask_for
 from faao_mav.wire.messages import GlobalPositionInt, HomePosition
 from faao_mav.wire.parameters import check_settable, set_parameters
 from faao_mav.wire.protocol import (
@@ -33,7 +33,6 @@ from faao_mav.wire.protocol import (
     MissionType,
     meaning,
 )
-from faao_mav.wire.questions import ask_alive, ask_for
 from faao_mav.wire.signing import Verdict, read_signing, remember
 from faao_mav.wire.transfer import PartReport, Peer
 from faao_mav.wire.transport import parse_connection

@@ -1,14 +1,26 @@
-"""Packets to messages and back, by pymavlink, always MAVLink 2."""
+"""Packets: where they begin and end, from whom they are, and what they say, by pymavlink.
+
+Source: MAVLink developer guide, "Serialization". What is written is always MAVLink 2.
+"""
 
 import re
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from faao_mav.wire import messages
-from faao_mav.wire.framing import Framer, is_signed, payload_of, sender_of
 from faao_mav.wire.messages import Envelope, Message, WireItem
 from faao_mav.wire.protocol import Address
 from faao_mav.wire.signing import Signing, Verdict
+
+_MAVLINK_1, _MAVLINK_2, _SIGNATURE = 0xFE, 0xFD, 13
+"""First bytes of packets, and the bytes of a MAVLink 2 packet's signature."""
+
+_AROUND = {_MAVLINK_1: 8, _MAVLINK_2: 12}
+"""Bytes of a packet's header and checksum, by its first byte."""
+
+_SIGNED = 0x01
+"""The flag, in the third byte of a MAVLink 2 packet, that it has a signature. There are no others
+yet, and a packet with one is not to be read."""
 
 _KINDS: dict[str, type[Message]] = {
     re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).upper(): kind
@@ -21,6 +33,75 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 _BEYOND = ("opaque_id", "mission_id")
 """Fields behind those that the dialects of pymavlink know, of 4 bytes."""
+
+
+class Framer:
+    """Cuts what one sender sends into packets, by the lengths that their headers tell.
+
+    >>> framer = Framer()
+    >>> framer.feed(bytes([0xFE, 1, 0, 1, 1, 0]))
+    []
+    >>> [packet.hex() for packet in framer.feed(bytes(3) + b"noise")]
+    ['fe0100010100000000']
+    """
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Return the packets that `data` completes; the beginning of one more is kept."""
+        stream, packets, place = self._rest + data, [], 0
+        while place < len(stream):
+            if stream[place] not in _AROUND:
+                place += 1
+                continue
+            end = place + _length_of(stream[place : place + 3])
+            if end > len(stream):
+                break
+            if stream[place] == _MAVLINK_1 or stream[place + 2] <= _SIGNED:
+                packets.append(stream[place:end])
+            place = end
+        self._rest = stream[place:]
+        return packets
+
+    def feed_datagram(self, data: bytes) -> list[bytes]:
+        """Return the packets that the datagram `data` completes.
+
+        Where it begins with a whole one, what is missing of the packet before it was cut off. Else
+        it may go on with that one, as what comes from serial lines by a bridge does.
+        """
+        if 0 < _length_of(data[:3]) <= len(data):
+            self._rest = b""
+        return self.feed(data)
+
+
+def _is_signed(packet: bytes) -> bool:
+    return packet[0] == _MAVLINK_2 and bool(packet[2] & _SIGNED)
+
+
+def sender_of(packet: bytes) -> Address:
+    """Return who says that it sent `packet`."""
+    system, component = packet[3:5] if packet[0] == _MAVLINK_1 else packet[5:7]
+    return Address(system, component)
+
+
+def message_id(packet: bytes) -> int:
+    """Return the number of the message in `packet`."""
+    if packet[0] == _MAVLINK_1:
+        return packet[5]
+    return int.from_bytes(packet[7:10], "little")
+
+
+def _length_of(header: bytes) -> int:
+    """Return how long the packet is that begins with the three bytes `header`, or with fewer.
+
+    It is 0 where none begins.
+    """
+    if not header or header[0] not in _AROUND:
+        return 0
+    if len(header) < 3:
+        return 3
+    return header[1] + _AROUND[header[0]] + _SIGNATURE * _is_signed(header)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +169,12 @@ class Codec:
                 message = self._reader.decode(bytearray(raw))
             except self._dialect.MAVError:
                 continue
-            verdict: Verdict = "signed" if is_signed(raw) else "unsigned"
-            if self._signing is not None:
-                verdict = self._signing.judge(raw, sender_of(raw))
-            if payload_of(raw) is not None:
-                self.modern.add(sender_of(raw))
+            sender = sender_of(raw)
+            verdict: Verdict = "unsigned"
+            if _is_signed(raw):
+                verdict = "signed" if self._signing is None else self._signing.judge(raw, sender)
+            if raw[0] == _MAVLINK_2:
+                self.modern.add(sender)
             envelope = _envelope(message, raw, origin)
             if envelope is not None:
                 self.heard.add(verdict)
@@ -114,9 +196,9 @@ def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
         params = (p.param1, p.param2, p.param3, p.param4)
         flags = (p.current, p.autocontinue)
         values["item"] = WireItem(p.command, p.frame, params, p.x, p.y, p.z, *flags)
+    payload = raw[10 : 10 + raw[1]] if raw[0] == _MAVLINK_2 else b""
     for name in values.keys() & _BEYOND:
-        rest = (payload_of(raw) or b"")[packet.unpacker.size :]
-        values[name] = int.from_bytes(rest[:4], "little")
+        values[name] = int.from_bytes(payload[packet.unpacker.size :][:4], "little")
     return Envelope(sender_of(raw), kind(**values), origin)
 
 

@@ -19,9 +19,8 @@ from faao_mav.wire.transfer import (
     read_list,
     send_list,
 )
-from faao_mav.wire.verify import compare
 from faao_mav.wire.whereabouts import Whereabouts
-from faao_mav.wire.wire_items import home_items
+from faao_mav.wire.wire_items import compare, home_items
 
 _ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
 """What a vehicle answers that has no such list at all."""

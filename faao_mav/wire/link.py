@@ -10,8 +10,7 @@ from typing import Any, Self, TypeAlias, TypeVar
 
 from faao_mav.errors import HangUp, LinkError
 from faao_mav.files import check_ending, check_writable
-from faao_mav.wire.codec import Codec, Packet
-from faao_mav.wire.framing import message_id, sender_of
+from faao_mav.wire.codec import Codec, Packet, message_id, sender_of
 from faao_mav.wire.machine import Machine, Script, Talk
 from faao_mav.wire.messages import Heartbeat, Message
 from faao_mav.wire.protocol import (

@@ -1,16 +1,34 @@
-"""Machines and talks: protocol logic without sockets, clocks or sleeping."""
+"""Machines, talks and their questions: protocol logic without sockets, clocks or sleeping."""
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Generator, Sequence
-from typing import Generic, TypeAlias, TypeVar
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
 
-from faao_mav.wire.messages import Envelope, Message
+from faao_mav.wire.messages import CommandLong, Envelope, M, Message, Timesync
+from faao_mav.wire.protocol import Address, MavCommand
 
+K = TypeVar("K")
 T = TypeVar("T")
 
-Progress: TypeAlias = tuple[str, int, int]
-"""What is going on, how much of it is done, and of how much (0: not counted)."""
+AT_ONCE = -math.inf
+"""What a talk yields that only wants its line."""
+
+SILENCE = 9.0
+"""Seconds that a transfer may get no further: PX4 asks again for 5 s, ArduPilot for 8 s."""
+
+_FIRST, SLOWEST = 0.25, 1.5
+"""Seconds after which a question is put again while it is not known how long answers take, and at
+the latest: the guide's."""
+
+_QUICKEST, _LONGEST = 0.02, 0.5
+"""Seconds after which it is put again at the earliest: vehicles answer in the turns of their main
+loop, of which the slowest (ArduPlane's) has 50 a second; and at the latest on a quick link: chosen.
+"""
+
+_GROWTH = 1.25
+"""By how much the wait grows with each question that has to be put again; chosen."""
 
 
 class Machine(ABC, Generic[T]):
@@ -61,34 +79,12 @@ class Machine(ABC, Generic[T]):
         """Do what is due now."""
 
 
-class Line:
-    """What a talk knows of its link: the time, s, and what was `heard`, None when time has passed.
+class Script(Machine[T]):
+    """A machine that runs a talk, whose outcome is not None, and the line that the talk is sent.
 
-    It tells its `progress`, and says messages, which are sent once it waits.
-    """
-
-    now = 0.0
-    heard: Envelope | None = None
-    progress: Progress = ("starting", 0, 0)
-    _said: list[Message]
-
-    def say(self, *messages: Message) -> None:
-        """Send `messages`."""
-        self._said += messages
-
-
-Talk: TypeAlias = Generator[float, Line, T]
-"""A conversation: it yields until when it waits, s, and is sent its line when something is heard or
-that time has come; `AT_ONCE` first. What it returns is the outcome of a `Script`; closed, it may
-still say a word.
-"""
-
-AT_ONCE = -math.inf
-"""What a talk yields that only wants its line."""
-
-
-class Script(Line, Machine[T]):
-    """A machine that runs a talk, whose line it is, and whose outcome is not None.
+    A line knows the time `now`, s, and what was `heard`, None when time has passed. The talk keeps
+    its `progress` there: what is going on, how much of it is done, and of how much (0: not
+    counted).
 
     >>> def knock():
     ...     line = yield AT_ONCE
@@ -100,9 +96,16 @@ class Script(Line, Machine[T]):
     (['knock'], 3.0, [], 'nobody')
     """
 
-    def __init__(self, talk: Talk[T]) -> None:
+    def __init__(self, talk: "Talk[T]") -> None:
         super().__init__()
         self._talk = talk
+        self._said: list[Message] = []
+        self.now, self.progress = 0.0, ("starting", 0, 0)
+        self.heard: Envelope | None = None
+
+    def say(self, *messages: Message) -> None:
+        """Send `messages` once the talk waits."""
+        self._said += messages
 
     def start(self, now: float) -> Sequence[Message]:
         """Begin the talk."""
@@ -130,3 +133,145 @@ class Script(Line, Machine[T]):
         except StopIteration as end:
             self.outcome = end.value
         return self._said
+
+
+Talk: TypeAlias = Generator[float, Script[Any], T]
+"""A conversation: it yields until when it waits, s, and is sent its line when something is heard or
+that time has come; `AT_ONCE` first. What it returns is the outcome of a `Script`; closed, it may
+still say a word.
+"""
+
+
+class Pace:
+    """How long to `wait` for an answer before it is asked for again, s.
+
+    It is `_FIRST` at first, then the mean and four deviations of the time that answers take
+    (RFC 6298). An answer to a question that was put again tells nothing of that time (Karn's rule):
+    the wait grows, so that a link that has become slow is measured in the end.
+    """
+
+    def __init__(self) -> None:
+        self.mean: float | None = None
+        """Mean time of answers, s; None before the first one."""
+        self._deviation = 0.0
+        self.wait = _FIRST
+
+    def repeat(self) -> None:
+        """Note that a question has to be put again."""
+        self.wait = min(_GROWTH * self.wait, SLOWEST)
+
+    def answer(self, took: float) -> None:
+        """Note how long the answer took to a question that was put once."""
+        if self.mean is None:
+            self.mean, self._deviation = took, took / 2
+        else:
+            self._deviation += (abs(took - self.mean) - self._deviation) / 4
+            self.mean += (took - self.mean) / 8
+        self.wait = min(max(self.mean + 4 * self._deviation, _QUICKEST), SLOWEST)
+
+
+@dataclass(slots=True)
+class _Question:
+    """What is said when it is late; when it was put last, s, and how often."""
+
+    again: tuple[Message, ...] = ()
+    sent: float = 0.0
+    times: int = 0
+
+
+class Questions(Generic[K]):
+    """Questions on a `line`, each under a key, which are put again at a `pace` until answered.
+
+    They are over at the time `until`: `silence` seconds after they last got `further`.
+    """
+
+    def __init__(self, line: Script[Any], pace: Pace, silence: float) -> None:
+        self._line, self.pace, self._silence = line, pace, silence
+        self.asked: dict[K, _Question] = {}
+        self.until = line.now + silence
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing was answered for too long."""
+        return self._line.now >= self.until
+
+    def further(self) -> None:
+        """Note that it has got further."""
+        self.until = self._line.now + self._silence
+
+    def put(self, key: K, *messages: Message, again: tuple[Message, ...] = ()) -> None:
+        """Put a question, or one under way once more; `again` is said instead once it is late."""
+        question = self.asked.setdefault(key, _Question())
+        question.again, question.sent = again or messages, self._line.now
+        question.times += 1
+        self._line.say(*messages)
+
+    def times(self, key: K) -> int:
+        """Return how often a question under way was put."""
+        return self.asked[key].times if key in self.asked else 0
+
+    def answer(self, key: K) -> bool:
+        """Note that a question is answered; tell whether it was under way."""
+        question = self.asked.pop(key, None)
+        if question is not None and question.times == 1:
+            self.pace.answer(self._line.now - question.sent)
+        return question is not None
+
+    def hear(self) -> Talk[Envelope | None]:
+        """Return what is heard next; None once time has passed, and late ones were put again."""
+        yield min([self.until, *map(self._due, self.asked.values())])
+        if self._line.heard is None:
+            late = {k: each for k, each in self.asked.items() if self._due(each) <= self._line.now}
+            if any(each.times == 1 for each in late.values()):
+                self.pace.repeat()
+            for key, question in late.items():
+                self.put(key, *question.again)
+        return self._line.heard
+
+    def _due(self, question: _Question) -> float:
+        """Return when `question` is put again: each time after twice as long."""
+        wait = self.pace.wait * 2.0 ** min(question.times - 1, 8)  # beyond the longest
+        return question.sent + min(wait, max(_LONGEST, self.pace.wait))
+
+
+def ask(
+    what: str,
+    question: Message,
+    answer: Callable[[Envelope], T | None],
+    patience: float = 3.0,
+) -> Talk[T | None]:
+    """Put one question until it is answered, for `patience` seconds; return the answer, or None.
+
+    `answer` returns what an envelope says to it, None for nothing; `what` is being done in words.
+    """
+    line = yield AT_ONCE
+    line.progress = what, 0, 0
+    questions = Questions[str](line, Pace(), patience)
+    questions.put(what, question)
+    while not questions.over:
+        heard = yield from questions.hear()
+        if heard is not None and (found := answer(heard)) is not None:
+            return found
+    return None
+
+
+def ask_for(vehicle: Address, number: int, kind: type[M]) -> Talk[M | None]:
+    """Ask `vehicle` for its message of the type `kind` and that `number`."""
+    question = CommandLong(vehicle, MavCommand.REQUEST_MESSAGE, 0, float(number))
+    what = f"asking for {kind.__name__}"
+    return ask(what, question, lambda heard: heard.said(vehicle, kind))
+
+
+def ask_alive(vehicle: Address, number: int) -> Talk[bool]:
+    """Ask for the answer to a `number` that nobody could know before; tell whether it comes.
+
+    One that reads MAVLink 1 alone does not give it. On a link that is signed a recording cannot,
+    and what was recorded before the answer is older than it: it is passed over from then on.
+    """
+
+    def answer(heard: Envelope) -> bool | None:
+        told = heard.said(vehicle, Timesync)
+        return (told and told.tc1 != 0 and told.ts1 == number) or None
+
+    said = yield from ask("asking for a sign of life", Timesync(0, number), answer, SILENCE)
+    return said is not None

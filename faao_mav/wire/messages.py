@@ -1,3 +1,4 @@
+# ruff: noqa: D101
 """The messages that missions and the mock autopilot are about, parsed whole.
 
 Each type is named after its MAVLink message, and its fields have the message's names and units;
@@ -62,8 +63,6 @@ class MissionCount(ListMessage):
 
 
 class MissionRequestInt(ListMessage):
-    """MISSION_REQUEST_INT."""
-
     seq: int
 
 
@@ -72,8 +71,6 @@ class MissionRequest(MissionRequestInt):
 
 
 class MissionItemInt(ListMessage):
-    """MISSION_ITEM_INT."""
-
     seq: int
     item: WireItem
 
@@ -85,12 +82,10 @@ class MissionAck(ListMessage):
     opaque_id: int = 0
 
 
-class MissionRequestList(ListMessage):
-    """MISSION_REQUEST_LIST."""
+class MissionRequestList(ListMessage): ...
 
 
-class MissionClearAll(ListMessage):
-    """MISSION_CLEAR_ALL."""
+class MissionClearAll(ListMessage): ...
 
 
 class MissionCurrent(Message):
@@ -113,8 +108,6 @@ class CurrentMode(Message):
 
 
 class CommandLong(Addressed):
-    """COMMAND_LONG."""
-
     command: int
     confirmation: int
     param1: float = 0.0
@@ -141,8 +134,7 @@ class SetMode(Message):
     custom_mode: int
 
 
-class ParamRequestList(Addressed):
-    """PARAM_REQUEST_LIST."""
+class ParamRequestList(Addressed): ...
 
 
 class ParamRequestRead(Addressed):
@@ -153,16 +145,12 @@ class ParamRequestRead(Addressed):
 
 
 class ParamSet(Addressed):
-    """PARAM_SET."""
-
     param_id: str
     param_value: float
     param_type: int
 
 
 class ParamValue(Message):
-    """PARAM_VALUE."""
-
     param_id: str
     param_value: float
     param_type: int
@@ -171,8 +159,6 @@ class ParamValue(Message):
 
 
 class Heartbeat(Message):
-    """HEARTBEAT."""
-
     type: int
     autopilot: int
     base_mode: int

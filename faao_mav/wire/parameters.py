@@ -12,10 +12,9 @@ from typing import TypeAlias
 from faao_mav.autopilot import VehicleType, vehicle_types
 from faao_mav.autopilot.parameter import Parameter
 from faao_mav.errors import InputError
-from faao_mav.wire.machine import AT_ONCE, Talk
+from faao_mav.wire.machine import AT_ONCE, Pace, Questions, Talk
 from faao_mav.wire.messages import ParamRequestRead, ParamSet, ParamValue
 from faao_mav.wire.protocol import listed
-from faao_mav.wire.questions import Pace, Questions
 from faao_mav.wire.transfer import Peer
 
 Names: TypeAlias = tuple[str, ...]

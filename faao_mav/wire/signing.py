@@ -15,7 +15,6 @@ from typing import Literal, TypeAlias
 
 from faao_mav.errors import InputError
 from faao_mav.files import read_bytes, write_whole
-from faao_mav.wire.framing import is_signed
 from faao_mav.wire.protocol import Address
 
 Verdict: TypeAlias = Literal["signed", "unsigned", "forged", "old"]
@@ -51,9 +50,10 @@ class Signing:
         return self.latest
 
     def judge(self, packet: bytes, sender: Address) -> Verdict:
-        """Return what `packet` is; a "signed" one is taken, and would be "old" the next time."""
-        if not is_signed(packet):
-            return "unsigned"
+        """Return what `packet`, which has a signature, is.
+
+        A "signed" one is taken, and would be "old" the next time.
+        """
         digest = hashlib.sha256(self.key + packet[:-6]).digest()
         if not hmac.compare_digest(digest[:6], packet[-6:]):
             return "forged"

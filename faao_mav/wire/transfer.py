@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.autopilot.manners import Manners
-from faao_mav.wire.machine import AT_ONCE, Line, Talk
+from faao_mav.wire.machine import AT_ONCE, SILENCE, SLOWEST, Pace, Questions, Script, Talk
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
@@ -21,8 +21,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import Address, MavResult, MissionType
-from faao_mav.wire.questions import SILENCE, SLOWEST, Pace, Questions
-from faao_mav.wire.verify import Difference
+from faao_mav.wire.wire_items import Difference
 
 Verdict: TypeAlias = Literal[
     "accepted", "unknown", "verified", "different", "unread", "refused", "silent", "armed",
@@ -109,7 +108,7 @@ class PartReport:
 class _Exchange(Questions[int]):
     """One list on its way: its questions, and what the vehicle says."""
 
-    def __init__(self, line: Line, peer: Peer, part: MissionType, *, writes: bool) -> None:
+    def __init__(self, line: Script[Any], peer: Peer, part: MissionType, *, writes: bool) -> None:
         super().__init__(line, peer.pace, SILENCE)
         self._peer, self._part = peer, part
         self._writes = writes and not peer.may_be_armed

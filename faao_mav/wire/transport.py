@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.wire.framing import Framer
+from faao_mav.wire.codec import Framer
 
 FORMS = (
     "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "

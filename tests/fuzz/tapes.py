@@ -14,8 +14,7 @@ from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
 from faao_mav.sim import MockAutopilot
-from faao_mav.wire.codec import Codec
-from faao_mav.wire.framing import message_id
+from faao_mav.wire.codec import Codec, message_id
 from faao_mav.wire.machine import Machine
 
 _HEADER = 10

@@ -15,9 +15,8 @@ from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
-from faao_mav.wire.codec import Codec
+from faao_mav.wire.codec import Codec, Framer
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.framing import Framer
 from faao_mav.wire.jobs import (
     Lists,
     UploadReport,
@@ -25,7 +24,7 @@ from faao_mav.wire.jobs import (
     explain,
     upload_parts,
 )
-from faao_mav.wire.machine import Machine, Script, Talk
+from faao_mav.wire.machine import Machine, Script, Talk, ask_alive, ask_for
 from faao_mav.wire.messages import (
     CommandLong,
     Heartbeat,
@@ -45,7 +44,6 @@ from faao_mav.wire.protocol import (
     MavCommand,
     MissionType,
 )
-from faao_mav.wire.questions import ask_alive, ask_for
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer import Peer
 from faao_mav.wire.wire_items import mission_of, wire_items

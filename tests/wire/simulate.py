@@ -8,8 +8,7 @@ from itertools import count
 from typing import Any
 
 from faao_mav.sim.faults import Channel, Faults
-from faao_mav.wire.codec import Codec
-from faao_mav.wire.framing import message_id
+from faao_mav.wire.codec import Codec, message_id
 from faao_mav.wire.messages import Envelope, Message
 from faao_mav.wire.protocol import Address
 

@@ -52,7 +52,7 @@ def peer_of(kind: str) -> Peer:
 def hurry(monkeypatch: pytest.MonkeyPatch, silence: float = 0.3) -> None:
     """Have transfers given up soon."""
     for name, value in (
-        ("questions.SILENCE", silence),
+        ("machine.SILENCE", silence),
         ("transfer.SILENCE", silence),
         ("transfer.ATTEMPTS", 1),
         ("jobs.ATTEMPTS", 1),

@@ -20,9 +20,8 @@ from faao_mav.fly.preflight import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import download, upload
 from faao_mav.wire.client import holdings
-from faao_mav.wire.codec import Codec
+from faao_mav.wire.codec import Codec, message_id, sender_of
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.framing import message_id, sender_of
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,

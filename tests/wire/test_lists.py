@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from stations import FOREIGN, VEHICLE, Desk, peer_of, rows_for
 
-from faao_mav.wire.machine import AT_ONCE, Script, Talk
+from faao_mav.wire.machine import AT_ONCE, Pace, Questions, Script, Talk
 from faao_mav.wire.messages import (
     Envelope,
     Heartbeat,
@@ -21,7 +21,6 @@ from faao_mav.wire.messages import (
     Statustext,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
-from faao_mav.wire.questions import Pace, Questions
 from faao_mav.wire.transfer import read_list, send_list
 
 ME = GROUND_STATION

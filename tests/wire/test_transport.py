@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 from stations import VEHICLE
 
-from faao_mav.wire.codec import Codec
-from faao_mav.wire.framing import Framer, message_id, sender_of
+from faao_mav.wire.codec import Codec, Framer, message_id, sender_of
 from faao_mav.wire.messages import Heartbeat, Message, Statustext
 from faao_mav.wire.transport import Transport, open_transport
 

@@ -12,8 +12,7 @@ from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
-from faao_mav.wire.verify import compare
-from faao_mav.wire.wire_items import wire_items
+from faao_mav.wire.wire_items import compare, wire_items
 
 MISSION = MissionType.MISSION
 WAYPOINT = MissionItem(16, 3, (2.7, 5.0, 1.5, 30.0), -35.0, 149.0, 20.0)
