@@ -1,9 +1,12 @@
-"""MAVSDK, written by others: its client against our mock, our client against its server."""
+"""MAVSDK, written by others: its client and our mock, our client and its server, our plans."""
 
+import math
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,11 +20,19 @@ from mavsdk.plugins.mission_raw_server import MissionRawServer
 from served import running
 from stations import FENCE, HOME, RALLY, a_mission, places
 
+from faao_mav.autopilot import Vehicle
+from faao_mav.autopilot.files import plan_target
+from faao_mav.mission import Mission, MissionItem
+from faao_mav.mission.formats import write_qgc_plan
+from faao_mav.mission.formats.qgc_plan import read_qgc_plan
+from faao_mav.mission.item import fence_items, rally_items
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import upload
 from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.wire_items import wire_items
+
+DATA = Path(__file__).parent.parent / "data" / "missions"
 
 
 @contextmanager
@@ -45,8 +56,28 @@ def found_places(items: list[SdkItem]) -> list[tuple[int, int, int, float]]:
     return [(item.command, item.x, item.y, item.z) for item in items]
 
 
+def assert_read_alike(client: MissionRaw, text: str, kind: str) -> None:
+    """MAVSDK makes of a plan's `text` what we do."""
+    read = client.import_qgroundcontrol_mission_from_string(text)
+    mission = read_qgc_plan(text).mission
+    flown = read.mission_items[kind == "ardupilot" :]  # it puts the planned home before them
+    assert [row.autocontinue for row in flown] == [item.autocontinue for item in mission.items]
+    fence = replace(mission.fence, breach_return=None)  # which it passes over
+    for rows, items in (
+        (flown, mission.items),
+        (read.geofence_items, fence_items(fence)),
+        (read.rally_items, rally_items(mission.rally)),
+    ):
+        for row, item in zip(rows, items, strict=True):
+            scale = 1 if item.frame == 2 else 1e7
+            numbers = row.param1, row.param2, row.param3, row.param4, row.z
+            assert (row.command, row.frame) == (item.command, item.frame)
+            assert numbers == pytest.approx((*item.params, item.z), nan_ok=True)
+            assert max(abs(row.x - item.x * scale), abs(row.y - item.y * scale)) <= 1
+
+
 @pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_mavsdk_uploads_downloads_clears_and_flies(kind: MockKind) -> None:
+def test_mavsdk_reads_plans_uploads_downloads_clears_and_flies(kind: MockKind) -> None:
     port, reached = free_port(), threading.Event()
     mock = MockAutopilot(behaviour_of(kind), home=HOME, beat=0.1, speedup=40.0)
     mission = a_mission(8, fence=FENCE, rally=RALLY)
@@ -58,6 +89,12 @@ def test_mavsdk_uploads_downloads_clears_and_flies(kind: MockKind) -> None:
         system = sdk.first_autopilot(10.0)
         assert system is not None, "MAVSDK saw no heartbeat in 10 s"
         client = MissionRaw(system)
+        pause = MissionItem(16, 3, (2.5, 0.0, 0.0, math.nan), 47.0, 8.0, 30.0, autocontinue=False)
+        jump = MissionItem(177, 2, (3.0, 2.0, 0.0, 0.0))
+        odd = Mission((*mission.items, pause, jump), HOME, FENCE, RALLY)
+        assert_read_alike(client, write_qgc_plan(odd, plan_target(Vehicle(kind))), kind)
+        for name in ("px4.plan", "survey.plan", "fence_and_rally.plan"):
+            assert_read_alike(client, (DATA / name).read_text(), kind)
         client.upload_mission(sdk_items(rows, MissionType.MISSION))
         client.upload_geofence(sdk_items(fence, MissionType.FENCE))
         client.upload_rally_points(sdk_items(rally, MissionType.RALLY))
