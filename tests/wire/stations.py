@@ -19,12 +19,10 @@ from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
     Message,
-    MissionItemInt,
-    MissionRequestInt,
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
-from faao_mav.wire.transfer import Peer, read_list, send_list
+from faao_mav.wire.transfer import Peer
 from faao_mav.wire.wire_items import wire_items
 
 VEHICLE = Address(1, 1)
@@ -189,40 +187,6 @@ class Counted:
     def hang_up(self, now: float) -> Sequence[Message]:
         return self._note(self.machine.hang_up(now))
 
-    def number(self) -> int:
-        """Return how many items and requests for items those are."""
-        kinds = (MissionItemInt, MissionRequestInt)
-        return sum(isinstance(message, kinds) for message in self.sent)
-
     def _note(self, messages: Sequence[Message]) -> Sequence[Message]:
         self.sent += messages
         return messages
-
-
-@dataclass(frozen=True)
-class Course:
-    """How a transfer went: s, and items and requests sent by either end."""
-
-    status: str
-    took: float
-    ours: int
-    theirs: int
-
-
-def there_and_back(
-    kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0, **more: Any
-) -> list[Course]:
-    """Return the courses of an upload of `count` rows and of reading them back."""
-    mock = MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry)
-    mock.tick(0.0)
-    peer = peer_of(kind)
-    rows = rows_for(kind, count)[:count]
-    courses = []
-    for talk in (send_list(rows, peer), read_list(peer)):
-        client, server = Counted(Script(talk)), Counted(mock)
-        stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
-        took = simulate(*stations, faults, until=2000.0, **more)
-        courses.append(Course(client.outcome.verdict, took, client.number(), server.number()))
-        if client.outcome.found:
-            assert client.outcome.found == mock.lists.items(MissionType.MISSION)
-    return courses

@@ -2,9 +2,9 @@
 
 import time
 from collections import defaultdict
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY
 
 import pytest
 from hypothesis import given
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
 from scenes import Scene
-from stations import HOME, VEHICLE, Air, a_mission, hurry
+from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly_mission
@@ -21,7 +21,7 @@ from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import download, upload
 from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec, message_id, sender_of
-from faao_mav.wire.discover import FoundVehicle, choose, discover
+from faao_mav.wire.discover import Heard, choose, discover
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
@@ -45,14 +45,11 @@ def a_mock(system: int = 1, **options: Any) -> MockAutopilot:
 # ---- which component is the autopilot
 
 
-def found(
-    heard: Sequence[tuple[float, Address, Heartbeat]], **options: Any
-) -> tuple[tuple[FoundVehicle, ...], float]:
+def heard(*beats: tuple[float, Address, Heartbeat], **options: Any) -> tuple[Heard, float]:
     """Return what is found by what is heard at which times, and when."""
-    search = Script(discover(patience=10.0, **options))
-    left = sorted(heard, key=lambda each: each[0])
-    search.start(0.0)
-    now = 0.0
+    search, now = Script(discover(**{"patience": 10.0, **options})), 0.0
+    left = sorted(beats, key=lambda each: each[0])
+    search.start(now)
     while (due := search.deadline) is not None:
         if left and left[0][0] <= due:
             now, sender, beat = left.pop(0)
@@ -61,11 +58,12 @@ def found(
             now = due
             search.tick(now)
     assert search.outcome is not None
-    return search.outcome.vehicles, now
+    return search.outcome, now
 
 
-def addresses(vehicles: Sequence[FoundVehicle]) -> list[Address]:
-    return [each.address for each in vehicles]
+def found(*beats: tuple[float, Address, Heartbeat], **options: Any) -> list[tuple[Address, bool]]:
+    """Return who is found, and whether it is armed."""
+    return [(each.address, each.armed) for each in heard(*beats, **options)[0].vehicles]
 
 
 @pytest.mark.parametrize("component", [1, 154])
@@ -74,10 +72,9 @@ def test_what_does_not_fly_is_no_autopilot_and_its_flag_arms_nothing(component: 
     for kind in set(range(60)) - AIRFRAMES:
         beside = Heartbeat(kind, (0, 3, 8, 12)[kind % 4], ARMED, 0, 4)
         beats = [(step / 2, Address(1, component), beside) for step in range(30)]
-        (vehicle,), _ = found([*beats, (5.0, VEHICLE, BEAT)])
-        assert (vehicle.address, vehicle.armed) == (VEHICLE, False)
-        assert found(beats)[0] == ()
-        assert found(beats, system=1, component=component)[0] == ()
+        assert found(*beats, (5.0, VEHICLE, BEAT)) == [(VEHICLE, False)]
+        assert found(*beats) == []
+        assert found(*beats, system=1, component=component) == []
 
 
 @given(
@@ -92,27 +89,42 @@ def test_component_1_is_it_whoever_else_says_so_and_whenever(
         (early, Address(1, component), Heartbeat(kind, 0, ARMED, 0, 4))
         for early, component, kind in others
     ]
-    vehicles, now = found([*beats, (when, VEHICLE, BEAT)], system=system)
-    assert addresses(vehicles) == [VEHICLE]
-    assert not vehicles[0].armed
+    outcome, now = heard(*beats, (when, VEHICLE, BEAT), system=system)
+    assert [(each.address, each.armed) for each in outcome.vehicles] == [(VEHICLE, False)]
     assert now <= when + 1.5
 
 
 def test_another_component_is_it_only_where_it_is_given() -> None:
-    assert found([(0.5, COMPANION, BEAT), (1.5, COMPANION, BEAT)]) == ((), 10.0)
-    vehicles, now = found([(0.5, COMPANION, BEAT)], system=1, component=191)
-    assert (addresses(vehicles), now) == ([COMPANION], 0.5)
+    assert heard((0.5, COMPANION, BEAT), (1.5, COMPANION, BEAT)) == (Heard((), ANY), 10.0)
+    outcome, now = heard((0.5, COMPANION, BEAT), system=1, component=191)
+    assert ([each.address for each in outcome.vehicles], now) == ([COMPANION], 0.5)
 
 
-def test_what_else_was_heard_is_told() -> None:
-    search: Any = Script(discover(system=9, patience=1.0))
-    search.start(0.0)
-    search.on(Envelope(Address(9, 154), Heartbeat(26, 8, 0, 0, 4)), 0.1)
-    search.on(Envelope(VEHICLE, BEAT), 0.2)
-    search.tick(1.0)
-    told = r"system 9 within 1 s; there is only MAV_TYPE 26 \(system 9, component 154\); ArduPilot"
-    with pytest.raises(LinkError, match=told):
-        choose(search.outcome, "x", 9, None, 1.0)
+def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
+    armed = Heartbeat(COPTER, ARDUPILOT, ARMED, 0, 4)
+    assert found((0.1, VEHICLE, armed), (0.5, VEHICLE, BEAT)) == [(VEHICLE, True)]
+
+
+def test_who_cannot_be_meant_is_said_in_a_line() -> None:
+    crowd = [(0.5, Address(k % 255, k // 255), Heartbeat(2, 12, 0, 0, 3)) for k in range(20_000)]
+    companion = (0.1, Address(9, 154), Heartbeat(26, 8, 0, 0, 4))
+    meant = [companion, (0.2, VEHICLE, BEAT)]
+    cases: list[tuple[int | None, list[tuple[float, Address, Heartbeat]], str]] = [
+        (None, crowd, "several .*; and 250 more"),
+        (
+            9,
+            meant,
+            r"9 within 1 s; there is only MAV_TYPE 26 \(system 9, component 154\); ArduPilot",
+        ),
+    ]
+    for number, autopilot, name in ((10, 3, "ArduPilot"), (22, 12, "PX4"), (0, 12, "PX4")):
+        beat = (0.5, VEHICLE, Heartbeat(number, autopilot, 0, 0, 3))
+        cases.append((1, [beat], f"{name} vehicle of MAV_TYPE {number} .* not supported"))
+    for system, beats, told in cases:
+        outcome, _ = heard(*beats, patience=1.0, system=system)
+        with pytest.raises(LinkError, match=told) as caught:
+            choose(outcome, "udpin:0.0.0.0:14550", system, None, 1.0)
+        assert len(str(caught.value)) < 500
 
 
 # ---- two vehicles of one number
@@ -258,15 +270,13 @@ def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
     """PX4 1.13 and 1.14 on USB; it is that of no ground station, and only into a silence."""
 
     def asks(*heard: tuple[float, Message]) -> list[tuple[float, int]]:
-        search, out = Script(discover(patience=6.0, knocks=True)), list[tuple[float, int]]()
-        search.start(0.0)
-        for step in range(1, 13):
-            now = step / 2
-            for when, message in heard:
-                if when == now:
-                    search.on(Envelope(VEHICLE, message), now)
-            sent = search.tick(now)
-            out += [(now, each.type) for each in sent if isinstance(each, Heartbeat)]
+        desk, out = Desk(Script(discover(patience=6.0, knocks=True))), list[tuple[float, int]]()
+        desk.start()
+        for _ in range(12):
+            sent = desk.wait(0.5)
+            out += [(desk.now, each.type) for each in sent if isinstance(each, Heartbeat)]
+            for _, message in (each for each in heard if each[0] == desk.now):
+                desk.tell(message)
         return out
 
     assert asks() == [(2.0, 18), (3.0, 18), (4.0, 18), (5.0, 18)]
@@ -288,12 +298,6 @@ def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> N
         upload(a_mission(5), "udpin:0.0.0.0:1", system=1)
     assert "SERIALn_PROTOCOL 2" in str(told.value)
     assert "\n" not in str(told.value)
-
-
-def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
-    armed = Heartbeat(COPTER, ARDUPILOT, ARMED, 0, 4)
-    (vehicle,), _ = found([(0.1, VEHICLE, armed), (0.5, VEHICLE, BEAT)])
-    assert vehicle.armed
 
 
 def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
