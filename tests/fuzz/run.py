@@ -24,7 +24,8 @@ def main() -> int:
     parser.add_argument("targets", nargs="*", help="names; all without")
     asked, findings = parser.parse_args(), 0
 
-    sys.path.append(str(Path(__file__).parents[1]))  # what the tests share
+    tests = Path(__file__).parents[1]
+    sys.path += [str(tests), str(tests / "wire")]  # what the tests share
     from targets import targets
     from wire_targets import wire_targets
 

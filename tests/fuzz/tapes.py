@@ -1,4 +1,4 @@
-"""Tapes: what one end of a link hears, datagram by datagram; recorded from mocks, and mutated.
+"""Tapes: what one end of a link hears, datagram by datagram; how they are mutated.
 
 A tape is the datagrams one after the other, before each its length in two bytes, big-endian.
 """
@@ -13,7 +13,6 @@ from mutate import changed, damaged
 from pymavlink.dialects.v20 import common
 from pymavlink.generator.mavcrc import x25crc
 
-from faao_mav.sim import MockAutopilot
 from faao_mav.wire.codec import Codec, message_id
 from faao_mav.wire.machine import Machine
 
@@ -80,28 +79,6 @@ def answer(machine: Machine[Any], codec: Codec, datagram: bytes, now: float) -> 
 
 def packed(codec: Codec, messages: Sequence[Any]) -> list[bytes]:
     return [codec.pack(message) for message in messages]
-
-
-def recorded(
-    client: Machine[Any], station: Codec, mock: MockAutopilot, vehicle: Codec
-) -> tuple[bytes, bytes]:
-    """Return what the client and what the mock heard until the client had its outcome."""
-    to_client: list[bytes] = packed(vehicle, mock.start(0.0))
-    to_mock = packed(station, client.start(0.0))
-    tapes: tuple[list[bytes], list[bytes]] = ([], [])
-    now = 0.0
-    while client.outcome is None:
-        now += _STEP
-        heard, to_client = to_client, packed(vehicle, mock.tick(now))
-        tapes[0].extend(heard)
-        for packet in heard:
-            to_mock += answer(client, station, packet, now)
-        to_mock += packed(station, client.tick(now))
-        heard, to_mock = to_mock, []
-        tapes[1].extend(heard)
-        for packet in heard:
-            to_client += answer(mock, vehicle, packet, now)
-    return tape_of(tapes[0]), tape_of(tapes[1])
 
 
 def mutated(tape: bytes, others: Sequence[bytes], random: Random) -> bytes:

@@ -11,7 +11,7 @@ from wire_targets import wire_targets
 
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
          "map", "map_table", "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
-TAPES = {"client": 50, "mock_ardupilot": 20, "mock_px4": 15, "signed": 150}
+TAPES = {"client": 30, "mock_ardupilot": 15, "mock_px4": 8, "signed": 150}
 SLOW = {"bin": 100, "npz": 150, "gain": 150, "rates": 150}
 CASES = dict.fromkeys(FILES, 300) | SLOW | TAPES
 """Cases of each target in the suite; chosen: half a second, but for PX4's predicted flights."""

@@ -6,15 +6,16 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from harness import Target
-from tapes import answer, converse, datagrams, mutated, packed, recorded, tape_of
+from simulate import Station, simulate
+from stations import FENCE, HOME, KINDS, RALLY, VEHICLE, peer_of
+from tapes import answer, converse, datagrams, mutated, packed, tape_of
 
-from faao_mav.autopilot import vehicle_type
 from faao_mav.cli.transfers import as_dict
 from faao_mav.errors import FaaoError
-from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
+from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim.faults import Faults
 from faao_mav.wire.codec import Codec, Framer
 from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.jobs import (
@@ -40,17 +41,12 @@ from faao_mav.wire.messages import (
 from faao_mav.wire.protocol import (
     GROUND_STATION,
     HOME_POSITION,
-    Address,
     MavCommand,
     MissionType,
 )
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer import Peer
 from faao_mav.wire.wire_items import mission_of, wire_items
-
-_VEHICLE = Address(1, 1)
-_KINDS: tuple[MockKind, ...] = ("ardupilot", "px4")
-_HOME = Home(-35.363262, 149.165237, 584.0)
 
 _MISSION = Mission(
     (
@@ -61,22 +57,19 @@ _MISSION = Mission(
         MissionItem(177, 2, (2.0, 1.0, 0.0, 0.0)),
         MissionItem(20, 2),
     ),
-    _HOME,
-    Fence(
-        (Polygon(((-35.3, 149.1), (-35.4, 149.1), (-35.4, 149.2)), inclusion=True),),
-        (Circle((-35.36, 149.16), 40.0, inclusion=False),),
-    ),
-    (RallyPoint(-35.36, 149.16, 30.0),),
+    HOME,
+    FENCE,
+    RALLY,
 )
 """What is uploaded: some of each list."""
 
 _COMMANDS = (
     SetMode(1, 1, 0),
-    ParamRequestRead(_VEHICLE, "WPNAV_SPEED", -1),
-    ParamSet(_VEHICLE, "WPNAV_SPEED", 500.0, 9),
-    CommandLong(_VEHICLE, MavCommand.SET_MODE, 0, 1.0, 4.0, 4.0),
-    CommandLong(_VEHICLE, MavCommand.REQUEST_MESSAGE, 0, 148.0),
-    CommandLong(_VEHICLE, MavCommand.REBOOT, 0, 1.0),
+    ParamRequestRead(VEHICLE, "WPNAV_SPEED", -1),
+    ParamSet(VEHICLE, "WPNAV_SPEED", 500.0, 9),
+    CommandLong(VEHICLE, MavCommand.SET_MODE, 0, 1.0, 4.0, 4.0),
+    CommandLong(VEHICLE, MavCommand.REQUEST_MESSAGE, 0, 148.0),
+    CommandLong(VEHICLE, MavCommand.REBOOT, 0, 1.0),
     Timesync(0, 1),
 )
 """What ground stations say beside the mission protocol."""
@@ -84,7 +77,7 @@ _COMMANDS = (
 
 def wire_targets() -> dict[str, Target]:
     """Return the targets by name."""
-    heard = {kind: _session(kind) for kind in _KINDS}
+    heard = {kind: _session(kind) for kind in KINDS}
     found = [Target("client", _hear, [tapes[0] for tapes in heard.values()], mutated)]
     station = Codec(GROUND_STATION)
     for kind, (_, session) in heard.items():
@@ -94,13 +87,13 @@ def wire_targets() -> dict[str, Target]:
             return _serve(kind, content)
 
         found.append(Target(f"mock_{kind}", serve, [tape], mutated))
-    genuine = packed(Codec(_VEHICLE, _signing()), [_said(number) for number in range(20)])
+    genuine = packed(Codec(VEHICLE, _signing()), [_said(number) for number in range(20)])
     found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
     return {target.name: target for target in found}
 
 
 def _mock(kind: MockKind) -> MockAutopilot:
-    return MockAutopilot(behaviour_of(kind), home=_HOME, speedup=50.0)
+    return MockAutopilot(behaviour_of(kind), home=HOME, speedup=50.0)
 
 
 def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
@@ -119,11 +112,11 @@ def _asks(peer: Peer) -> Talk[list[object]]:
 
 def _session(kind: MockKind) -> tuple[bytes, bytes]:
     """Return what the client and a mock hear of each other from the heartbeat to the clearing."""
-    mock, station, vehicle = _mock(kind), Codec(GROUND_STATION), Codec(_VEHICLE)
-    peer = Peer(GROUND_STATION, _VEHICLE, vehicle_type(mock.vehicle.family.key, "copter"))
-    tapes = [recorded(job, station, mock, vehicle) for job in (Script(discover(1)), *_jobs(peer))]
-    ours, theirs = zip(*tapes, strict=True)
-    return b"".join(ours), b"".join(theirs)
+    mock, tapes = _mock(kind), (list[bytes](), list[bytes]())
+    for job in (Script(discover(1)), *_jobs(peer_of(kind))):
+        faults = Faults(latency=0.002)
+        simulate(Station(job, GROUND_STATION), Station(mock, VEHICLE), faults, tapes=tapes)
+    return tape_of(tapes[0]), tape_of(tapes[1])
 
 
 def _hear(tape: bytes) -> object:
@@ -167,13 +160,13 @@ def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
 
 def _serve(kind: MockKind, tape: bytes) -> object:
     """Tell a mock what is on `tape`, start it whatever it holds, and ask it for everything."""
-    mock, vehicle, station = _mock(kind), Codec(_VEHICLE), Codec(GROUND_STATION)
+    mock, vehicle, station = _mock(kind), Codec(VEHICLE), Codec(GROUND_STATION)
     packed(vehicle, mock.start(0.0))
     asked = [
-        CommandLong(_VEHICLE, MavCommand.ARM, 0, 1.0),
-        CommandLong(_VEHICLE, MavCommand.START, 0),
-        *(MissionRequestList(_VEHICLE, part) for part in MissionType),
-        *(MissionRequestInt(_VEHICLE, part, 0) for part in MissionType),
+        CommandLong(VEHICLE, MavCommand.ARM, 0, 1.0),
+        CommandLong(VEHICLE, MavCommand.START, 0),
+        *(MissionRequestList(VEHICLE, part) for part in MissionType),
+        *(MissionRequestInt(VEHICLE, part, 0) for part in MissionType),
     ]
     now = 0.0
     for datagram in [*datagrams(tape), *packed(station, asked)]:

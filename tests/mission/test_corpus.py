@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from faao_mav.errors import MissionFileError
-from faao_mav.mission import Home, Mission, MissionItem
+from faao_mav.mission import Home, Mission
 from faao_mav.mission.formats import read_mission, read_mission_file
 
 FOLDER = Path(__file__).parent.parent / "data" / "missions"
@@ -105,19 +105,9 @@ def test_the_others_are_refused() -> None:
         assert "\n" not in str(caught.value)
 
 
-def test_what_else_the_files_tell() -> None:
+def test_what_else_a_plan_tells() -> None:
     read = read_mission_file(FOLDER / "fence_and_rally.plan")
     assert (read.firmware, read.vehicle_type) == (12, 2)
-    mission = read.mission
-    assert mission.home == Home(47.397742, 8.545594, 488.2)
-    assert mission.items[2] == MissionItem(
-        16, 3, mission.items[2].params, 47.3985, 8.5461, 30, autocontinue=True
-    )
-    (circle,), (polygon,) = mission.fence.circles, mission.fence.polygons
-    assert (circle.center, circle.radius, circle.inclusion) == ((47.398, 8.546), 25.5, False)
-    assert (len(polygon.vertices), polygon.inclusion) == (4, True)
-    assert polygon.vertices[1] == (47.396, 8.549)
-    assert mission.fence.breach_return is not None
-    assert mission.fence.breach_return.altitude == 50
-    assert [(p.latitude, p.longitude, p.altitude) for p in mission.rally] == [(47.3976, 8.5457, 40)]
-    assert read_mission_file(FOLDER / "plain.waypoints").firmware is None
+    assert read.mission.home == Home(47.397742, 8.545594, 488.2)
+    assert read.mission.fence.breach_return is not None
+    assert read.mission.fence.breach_return.altitude == 50

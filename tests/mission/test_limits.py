@@ -1,4 +1,4 @@
-"""What no autopilot keeps is refused by every format, at the same count, in one line."""
+"""What is impossible, or no autopilot keeps, is refused by every format alike, in one line."""
 
 import json
 import math
@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 from conftest import SMALL
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from faao_mav.errors import InputError
-from faao_mav.mission import fence
+from faao_mav.mission import Command, Frame, Home, fence
 from faao_mav.mission.fence import MAX_CORNERS, Circle, Fence, LatLon, Polygon, RallyPoint
 from faao_mav.mission.formats import read_mission, write_mission, write_qgc_plan
 from faao_mav.mission.formats.fence_file import read_fence
@@ -64,6 +65,26 @@ FORMATS: dict[str, tuple[Callable[[Zones, Path], None], Callable[[Path], object]
     "x.yaml": (as_yaml, read_plan),
 }
 """How a fence is written to a file of each format, and read."""
+
+
+def test_commands_and_frames_have_mavlinks_numbers() -> None:
+    for kind, prefix in ((Command, "MAV_CMD"), (Frame, "MAV_FRAME")):
+        for each in kind:
+            assert mavlink.enums[prefix][int(each)].name == f"{prefix}_{each.name}"
+
+
+def test_what_is_impossible_is_refused() -> None:
+    for kind, arguments, told in (
+        (MissionItem, (65_536, 3), "command 65536; expected 0 to 65535"),
+        (MissionItem, (16, -1), "frame -1; expected 0 to 255"),
+        (MissionItem, (16, 3, (0.0, 0.0, math.nan, math.inf)), "expected finite"),
+        (MissionItem, (16, 3, (0.0,) * 4, 0.0, 0.0, -math.inf), "expected finite"),
+        (Home, (91.0, 0.0, 0.0), "home"),
+        (Home, (0.0, 180.1, 0.0), "home"),
+        (Home, (0.0, 0.0, math.inf), "home"),
+    ):
+        with pytest.raises(InputError, match=told):
+            kind(*arguments)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", FORMATS)

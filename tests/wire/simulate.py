@@ -47,13 +47,15 @@ def simulate(
     events: Sequence[tuple[float, Callable[[float], object]]] = (),
     heard: Callable[[Envelope, float], object] | None = None,
     lost: tuple[int, int] | None = None,
+    tapes: Sequence[list[bytes]] | None = None,
 ) -> float:
     """Run until `client` has an outcome, or `until`, and return the time that it took, s.
 
     Everybody hears everybody, as behind a router, through `faults` that are drawn for each pair
     and direction. Packets are real ones: what is corrupted is rejected by its checksum, or is
     not. `events` are called at their times, with them; `heard` is told what the client receives.
-    Of the message with the first number in `lost` each channel loses one, counted from 1.
+    Of the message with the first number in `lost` each channel loses one, counted from 1. What the
+    client and the server receive is appended to their `tapes`.
     """
     faults = faults or Faults()
     nodes = [_Node(station, Codec(station.address)) for station in (client, server, *others)]
@@ -94,6 +96,8 @@ def simulate(
             planned.pop(0)[1](now)
         elif queue and queue[0][0] <= now:
             _, _, receiver, packet = heapq.heappop(queue)
+            if tapes is not None:
+                tapes[receiver].append(packet)
             node = nodes[receiver]
             for envelope in _read(node.codec, packet):
                 if receiver == 0 and heard is not None:

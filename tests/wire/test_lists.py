@@ -1,17 +1,12 @@
 """Uploading, downloading and clearing, told what a vehicle or a link may do to them."""
 
-import math
-from random import Random
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from stations import FOREIGN, VEHICLE, Desk, peer_of, rows_for
 
-from faao_mav.wire.machine import AT_ONCE, Pace, Questions, Script, Talk
+from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
-    Envelope,
     Heartbeat,
     MissionAck,
     MissionCount,
@@ -71,19 +66,6 @@ def test_the_last_words_of_a_vehicle_are_told() -> None:
     desk.tell(ack(MavResult.INVALID))
     desk.wait(2.0)
     assert desk.machine.outcome.said == ("no 2", "no 3", "no 4", "no 5", "no 6")
-
-
-def test_a_talk_waits_for_its_time_and_keeps_its_outcome() -> None:
-    def knock() -> Talk[str]:
-        line = yield AT_ONCE
-        line = yield line.now + 2.0
-        return f"nobody until {line.now}"
-
-    script = Script(knock())
-    script.start(1.0)
-    for now, outcome in ((2.9, None), (3.0, "nobody until 3.0"), (9.0, "nobody until 3.0")):
-        script.tick(now)
-        assert script.outcome == outcome
 
 
 def test_an_unknown_autopilot_is_sent_nothing_unasked() -> None:
@@ -167,34 +149,3 @@ def test_a_download_that_is_always_ended_is_begun_anew_a_few_times() -> None:
         desk.tell(ack(MavResult.ERROR))
     outcome = desk.machine.outcome
     assert (outcome.verdict, outcome.result) == ("refused", MavResult.ERROR)
-
-
-@settings(max_examples=100)
-@given(st.floats(0.001, 0.7), st.floats(0, 1), st.floats(0, 0.5), st.integers(0, 2**32))
-def test_a_link_is_never_flooded(least: float, jitter: float, loss: float, seed: int) -> None:
-    """A tenth more questions than needed, once it is known how long answers take."""
-    random, now, needed = Random(seed), 0.0, 0
-
-    def questions() -> Talk[str]:
-        asked = Questions[int]((yield AT_ONCE), Pace(), math.inf)
-        for _ in range(200):
-            asked.put(0, READY)
-            while (yield from asked.hear()) is None:
-                pass
-            asked.answer(0)
-        return "done"
-
-    script = Script(questions())
-    said = [*script.start(now)]
-    while script.outcome is None:
-        lost = 0
-        while random.random() < loss:
-            lost += 1
-        took, asked = least * (1 + jitter * random.random()), [now]
-        while len(asked) <= lost or (script.deadline or 0.0) < asked[lost] + took:
-            asked.append(script.deadline or 0.0)
-            said += script.tick(asked[-1])
-        now = asked[lost] + took
-        said += script.on(Envelope(VEHICLE, READY), now)
-        needed += 1 + lost
-    assert len(said) <= 1.1 * needed + 10

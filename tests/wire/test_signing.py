@@ -19,11 +19,10 @@ from stations import HOME, VEHICLE, Air, a_mission, hurry, signing_key
 from faao_mav.errors import InputError, LinkError
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import upload
-from faao_mav.wire.codec import Codec
+from faao_mav.wire.codec import Codec, sender_of
 from faao_mav.wire.messages import Heartbeat, Statustext
 from faao_mav.wire.protocol import GROUND_STATION
 from faao_mav.wire.signing import Signing, read_signing, remember
-from faao_mav.wire.transport import Transport, open_transport
 
 KEY = signing_key("open sesame")
 TEXT = Statustext(6, "hello")
@@ -134,46 +133,26 @@ def test_a_signed_session(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> No
         assert "signs its packets" in report.problems[-1]
 
 
-class Recorder:
-    """A transport that keeps what arrived, after how many packets sent."""
-
-    def __init__(self, inner: Transport) -> None:
-        self._inner, self.listens = inner, inner.listens
-        self._sent = 0
-        self.tape: list[tuple[int, bytes]] = []
-
-    def read(self, timeout: float) -> list[tuple[bytes, str]]:
-        found = self._inner.read(timeout)
-        self.tape += [(self._sent, packet) for packet, _ in found]
-        return found
-
-    def write(self, data: bytes, to: str | None = None) -> None:
-        self._sent += 1
-        self._inner.write(data, to)
-
-    def close(self) -> None:
-        self._inner.close()
-
-
 @pytest.mark.parametrize("remembered", [True, False])
 def test_a_recorded_session_is_not_taken_for_a_vehicle(
-    remembered: bool, key_file: Path, monkeypatch: pytest.MonkeyPatch
+    remembered: bool, key_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    link = "faao_mav.wire.link.open_transport"
     connection = f"udpout:127.0.0.1:{(port := free_port())}"
-    recorders: list[Recorder] = []
-
-    def recorded(text: str) -> Recorder:
-        recorders.append(Recorder(open_transport(text)))
-        return recorders[-1]
+    log, tape, sent = tmp_path / "x.tlog", list[tuple[int, bytes]](), [0]
 
     def put(**options: Any) -> Any:
         return upload(a_mission(5), connection, system=1, signing_key=key_file, **options)
 
-    monkeypatch.setattr(link, recorded)
     with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
-        assert put().verified
-    tape, sent = recorders[0].tape, [0]
+        assert put(log=log).verified
+    left = log.read_bytes()
+    while left:  # a time of 8 bytes, and a packet, whose second byte is the length of what it says
+        packet, left = left[8 : 33 + left[9]], left[33 + left[9] :]
+        if sender_of(packet) == VEHICLE:
+            tape.append((sent[0], packet))  # after so many that were sent
+        else:
+            sent[0] += 1
+    sent[0] = 0
 
     def played(data: bytes | None) -> list[tuple[bytes, str]]:
         sent[0] += data is not None
@@ -181,7 +160,7 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
         del tape[: len(due)]
         return due
 
-    monkeypatch.setattr(link, lambda _: Air(played, listens=False))
+    monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Air(played, listens=False))
     if not remembered:
         key_file.with_name("key.last").unlink()
     hurry(monkeypatch, 0.5)

@@ -1,6 +1,7 @@
 """Packets out of datagrams and streams, whoever else sends on the same port."""
 
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 
@@ -43,6 +44,7 @@ class Port:
     def peer(self) -> socket.socket:
         peer = self._open.enter_context(socket.socket(socket.AF_INET, self._kind))
         peer.connect(self.address)
+        peer.settimeout(5.0)
         return peer
 
     def received(self) -> list[bytes]:
@@ -116,6 +118,23 @@ def test_a_tcp_client_that_does_not_read_is_dropped(tcp: Port) -> None:
         busy.recv(1 << 20)
     busy.send(packet_of())
     assert tcp.received() == [packet_of()]
+
+
+def test_who_is_silent_for_half_a_minute_is_sent_nothing_more(
+    udp: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other = udp.peer(), udp.peer()
+    for now, peer in ((0.0, one), (20.0, other)):
+        monkeypatch.setattr(time, "monotonic", lambda now=now: now)
+        peer.send(packet_of())
+        udp.transport.read(1.0)
+    for now, heard in ((29.0, (one, other)), (31.0, (other,)), (51.0, ())):
+        monkeypatch.setattr(time, "monotonic", lambda now=now: now)
+        udp.transport.write(b"all")
+        udp.transport.write(b"you", "{}:{}".format(*one.getsockname()))
+        for peer in (one, other):
+            expected = [b"all"] * (peer in heard) + [b"you"] * (peer is one)
+            assert [peer.recv(9) for _ in expected] == expected
 
 
 @given(st.lists(st.sampled_from([packet_of(), packet_of(LONG), old_packet(), b"noise"])), st.data())
