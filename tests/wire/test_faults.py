@@ -1,6 +1,7 @@
 """Whatever the link does: an upload is verified and right, or reported as failed, and ends."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -82,9 +83,9 @@ def test_no_wrong_mission_is_ever_called_verified(
 @BOTH
 def test_what_a_link_does_is_overcome(kind: MockKind) -> None:
     """Loss; late packets and copies of them; and being dead for 3 s, but not for a minute."""
-    late = {"duplication": 0.05, "reordering": 0.1, "delay": 0.3}
+    late = Faults(duplication=0.05, reordering=0.1, delay=0.3)
     lossy = (Faults(loss=x, latency=0.03, seed=n) for x in (0.05, 0.2, 0.3, 0.4) for n in range(9))
-    for faults in (*lossy, *(Faults(**late, seed=seed) for seed in range(6))):
+    for faults in (*lossy, *(replace(late, seed=seed) for seed in range(6))):
         mock, rows = mock_of(kind), rows_for(kind, 12 if faults.loss else 30)
         report, took = upload_to(mock, rows, faults)
         assert report.verified, faults
