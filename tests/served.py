@@ -19,15 +19,17 @@ HOME = Home(-35.363262, 149.165237, 584.0)
 @contextmanager
 def vehicle(
     kind: MockKind = "ardupilot",
+    make: type[MockAutopilot] = MockAutopilot,
     *,
     refusals: Any = (),
     faults: Faults | None = None,
+    key: bytes | None = None,
     **options: Any,
-) -> Iterator[tuple[str, MockAutopilot]]:
+) -> Iterator[tuple[str, Any]]:
     """A mock at `HOME` that runs in the background, and the connection to it."""
     behaviour, port = behaviour_of(kind, refusals=dict(refusals)), free_port()
-    mock = MockAutopilot(behaviour, **{"home": HOME, "beat": 0.1, **options})
-    with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
+    mock = make(behaviour, **{"home": HOME, "beat": 0.1, **options})
+    with running(mock, f"udpin:127.0.0.1:{port}", faults=faults, key=key):
         yield f"udpout:127.0.0.1:{port}", mock
 
 

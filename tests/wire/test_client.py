@@ -10,16 +10,15 @@ import tty
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 from conftest import free_port
 from served import running, vehicle
-from stations import FENCE, HOME, RALLY, a_mission, places, vehicle_of
+from stations import FENCE, HOME, RALLY, a_mission, mock_of, places, vehicle_of
 
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission import Mission
-from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim import MockKind
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import download, upload
 from faao_mav.wire.protocol import MissionType
@@ -30,22 +29,12 @@ MISSION = MissionType.MISSION
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 
 
-@pytest.fixture
-def port() -> int:
-    return free_port()
-
-
-def mock_of(kind: MockKind | Behaviour, **options: Any) -> MockAutopilot:
-    behaviour = behaviour_of(kind) if isinstance(kind, str) else kind
-    return MockAutopilot(behaviour, home=HOME, beat=0.1, **options)
-
-
 @BOTH
-def test_a_mission_there_and_back(kind: MockKind, port: int) -> None:
-    mission, connection = a_mission(8, fence=FENCE, rally=RALLY), f"udpout:127.0.0.1:{port}"
-    faults, mock = Faults(loss=0.2, latency=0.0, seed=3), mock_of(kind, boot=1.5)
+def test_a_mission_there_and_back(kind: MockKind) -> None:
+    mission = a_mission(8, fence=FENCE, rally=RALLY)
     rows = places(wire_items(mission, MISSION, vehicle_of(kind)))
-    with running(mock, f"udpin:127.0.0.1:{port}", faults=faults):
+    faults = Faults(loss=0.2, latency=0.0, seed=3)
+    with vehicle(kind, faults=faults, boot=1.5) as (connection, mock):
         report = upload(mission, connection, system=1)
         assert report.verified, report.problems
         assert [part.part for part in report.parts] == list(MissionType)
@@ -54,7 +43,9 @@ def test_a_mission_there_and_back(kind: MockKind, port: int) -> None:
     assert places(wire_items(found, MISSION, vehicle_of(kind))) == rows
     assert (found.fence, found.rally) == (FENCE, RALLY)
     assert found.home in (HOME, None)  # asked for a few times only
-    with running(mock, f"udpin:127.0.0.1:{port}"):
+    with vehicle(kind) as (connection, mock):
+        for part in MissionType:
+            mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         kept = upload(a_mission(4), connection, system=1)
         assert [part.part for part in kept.parts] == [MISSION]
         assert mock.mission().rally == RALLY
@@ -68,7 +59,7 @@ def test_a_mission_there_and_back(kind: MockKind, port: int) -> None:
 )
 def test_other_ways_to_connect(listen: str, to: str) -> None:
     port = free_port(socket.SOCK_STREAM)
-    with running(mock_of("px4"), f"{listen}:127.0.0.1:{port}"):
+    with running(mock_of("px4", beat=0.1), f"{listen}:127.0.0.1:{port}"):
         assert upload(a_mission(5), f"{to}:127.0.0.1:{port}", system=1).verified
 
 
@@ -201,7 +192,7 @@ def test_a_serial_line(line: tuple[int, str]) -> None:
         def close(self) -> None:
             pass
 
-    with running(mock_of("ardupilot", rate=0.0), Radio()) as mock:
+    with running(mock_of("ardupilot", beat=0.1), Radio()) as mock:
         assert upload(a_mission(5), f"{name},57600", system=1).verified
     assert len(mock.mission().items) == 5
 

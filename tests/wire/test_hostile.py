@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import PATIENCE, free_port
-from served import running
-from stations import FENCE, HOME, VEHICLE, Air, a_mission, mock_of, vehicle_of
+from conftest import PATIENCE
+from served import vehicle
+from stations import FENCE, VEHICLE, Air, a_mission, mock_of, vehicle_of
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.formats.wpl import write_wpl
-from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
+from faao_mav.sim import MockAutopilot, MockKind
 from faao_mav.wire import upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.messages import (
@@ -80,9 +80,7 @@ class _Liar(MockAutopilot):
 def test_a_status_text_stays_on_its_line(tmp_path: Path) -> None:
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(a_mission(5)))
-    mock = _Liar(behaviour_of("px4"), home=HOME, beat=0.1)
-    to = f"udpout:127.0.0.1:{(port := free_port())}"
-    with running(mock, f"udpin:127.0.0.1:{port}"):
+    with vehicle("px4", _Liar) as (to, _):
         result = CliRunner().invoke(app, ["upload", str(path), "--to", to, "--system", "1"])
     assert result.exit_code == 1
     assert not re.search("^verified", result.stdout, re.MULTILINE)
@@ -121,10 +119,7 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
                 return ()
             return super()._receive(envelope, now)
 
-    mock = Ended(behaviour_of(kind), home=HOME, beat=0.1)
-    port = free_port()
-    with running(mock, f"udpin:127.0.0.1:{port}"):
-        to = f"udpout:127.0.0.1:{port}"
+    with vehicle(kind, Ended) as (to, _):
         arguments = ["upload", str(path), "--to", to, "--system", "1"]
         client = command(number, arguments, stderr=subprocess.PIPE)
         _, errors = client.communicate(timeout=PATIENCE)
@@ -153,9 +148,7 @@ def test_a_mission_goes_on_when_nobody_can_be_told_any_more(tmp_path: Path) -> N
     path.write_text(write_wpl(a_mission(9)))
     with ExitStack() as stack:
         for _ in range(2):
-            mock, port = _Told(behaviour_of("ardupilot"), home=HOME, beat=0.1), free_port()
-            stack.enter_context(running(mock, f"udpin:127.0.0.1:{port}"))
-            to = f"udpout:127.0.0.1:{port}"
+            to, mock = stack.enter_context(vehicle("ardupilot", _Told))
             assert upload(a_mission(9), to, system=1).verified
             arguments = ["fly", str(path), "--to", to, "--system", "1", "--arm"]
             flights.append((mock, command(signal.SIGHUP, arguments, stdout=subprocess.PIPE)))

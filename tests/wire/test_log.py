@@ -8,11 +8,10 @@ from conftest import free_port
 from full_disk import files_of_at_most
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
-from served import running
-from stations import HOME, a_mission
+from served import vehicle
+from stations import a_mission
 
 from faao_mav.errors import LinkError
-from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import download, upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.link import Tlog
@@ -59,17 +58,12 @@ def test_an_old_log_stays_until_something_is_received(path: Path) -> None:
 
 def test_a_full_disk_ends_the_log_and_not_the_session(path: Path) -> None:
     told: list[str] = []
-    mock = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1, rate=0.0)
-    connection = f"udpout:127.0.0.1:{(port := free_port())}"
-    with running(mock, f"udpin:127.0.0.1:{port}"), files_of_at_most(500):
-        report = upload(a_mission(8), connection, system=1, log=path, note=told.append)
-    assert report.verified
-    assert told == [f"{path}: cannot be written: File too large; the log ends early"]
-    assert path.stat().st_size == 500
-    with (
-        running(mock, f"udpin:127.0.0.1:{port}"),
-        files_of_at_most(100),
-        pytest.warns(UserWarning, match="the log ends early"),
-    ):
-        download(connection, system=1, log=path)
+    with vehicle("px4", rate=0.0) as (connection, _):
+        with files_of_at_most(500):
+            report = upload(a_mission(8), connection, system=1, log=path, note=told.append)
+        assert report.verified
+        assert told == [f"{path}: cannot be written: File too large; the log ends early"]
+        assert path.stat().st_size == 500
+        with files_of_at_most(100), pytest.warns(UserWarning, match="the log ends early"):
+            download(connection, system=1, log=path)
     assert {"TIMESYNC", "HEARTBEAT"} >= set(names(path)[:1])

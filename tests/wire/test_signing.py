@@ -6,18 +6,15 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from conftest import free_port
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
-from served import running
-from stations import HOME, VEHICLE, Air, a_mission, hurry, signing_key
+from served import vehicle
+from stations import VEHICLE, Air, a_mission, hurry, signing_key
 
 from faao_mav.errors import InputError, LinkError
-from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import upload
 from faao_mav.wire.codec import Codec, sender_of
 from faao_mav.wire.messages import Heartbeat, Statustext
@@ -44,10 +41,6 @@ def signing(key: bytes = KEY, latest: int = 0, clock: Callable[[], float] = lamb
 
 def signed(at: float = NOW, key: bytes = KEY) -> bytes:
     return Codec(VEHICLE, signing(key, clock=lambda: at)).pack(TEXT)
-
-
-def mock() -> MockAutopilot:
-    return MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1, rate=0.0)
 
 
 def test_signed_packets_need_the_key() -> None:
@@ -123,8 +116,7 @@ def test_the_last_time_is_kept_beside_the_key(key_file: Path) -> None:
 
 
 def test_a_signed_session(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    connection = f"udpout:127.0.0.1:{(port := free_port())}"
-    with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
+    with vehicle("px4", key=KEY) as (connection, _):
         for _ in range(2):  # the second is after what is remembered of the first
             assert upload(a_mission(5), connection, system=1, signing_key=key_file).verified
         hurry(monkeypatch, 0.5)
@@ -137,14 +129,10 @@ def test_a_signed_session(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> No
 def test_a_recorded_session_is_not_taken_for_a_vehicle(
     remembered: bool, key_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    connection = f"udpout:127.0.0.1:{(port := free_port())}"
     log, tape, sent = tmp_path / "x.tlog", list[tuple[int, bytes]](), [0]
 
-    def put(**options: Any) -> Any:
-        return upload(a_mission(5), connection, system=1, signing_key=key_file, **options)
-
-    with running(mock(), f"udpin:127.0.0.1:{port}", key=KEY):
-        assert put(log=log).verified
+    with vehicle("px4", rate=0.0, key=KEY) as (to, _):
+        assert upload(a_mission(5), to, system=1, signing_key=key_file, log=log).verified
     left = log.read_bytes()
     while left:  # a time of 8 bytes, and a packet, whose second byte is the length of what it says
         packet, left = left[8 : 33 + left[9]], left[33 + left[9] :]
@@ -166,7 +154,7 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
     hurry(monkeypatch, 0.5)
     told = "no vehicle: packets come .* of a recording" if remembered else "a recording of it"
     with pytest.raises(LinkError, match=told):
-        put(wait=1.0)
+        upload(a_mission(5), to, system=1, signing_key=key_file, wait=1.0)
 
 
 @pytest.mark.parametrize(
@@ -180,12 +168,8 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
 def test_another_key_or_none_is_told_as_such(
     theirs: bytes | None, told: str, key_file: Path
 ) -> None:
-    connection = f"udpout:127.0.0.1:{(port := free_port())}"
-    with (
-        running(mock(), f"udpin:127.0.0.1:{port}", key=theirs),
-        pytest.raises(LinkError, match=told),
-    ):
-        upload(a_mission(5), connection, signing_key=key_file, wait=2.0)
+    with vehicle("px4", key=theirs) as (to, _), pytest.raises(LinkError, match=told):
+        upload(a_mission(5), to, signing_key=key_file, wait=2.0)
 
 
 def test_times_of_sent_packets_grow_whatever_the_clock_does() -> None:
