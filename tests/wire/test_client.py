@@ -104,20 +104,6 @@ def test_what_cannot_be_sent_or_logged_is_an_error_before_anything_is_sent(tmp_p
     assert path.read_text() == "QGC WPL 110\n"
 
 
-def test_interrupted_from_the_keyboard() -> None:
-    def observe(what: str, done: int, total: int) -> None:
-        if what.startswith("uploading") and done == 3:
-            raise KeyboardInterrupt
-
-    with vehicle("px4") as (connection, _):
-        with pytest.raises(LinkError, match="interrupted while uploading mission at item 3 of 9"):
-            upload(a_mission(9), connection, system=1, observe=observe)
-        # The vehicle is free again at once, and nothing of it holds the port.
-        report = upload(a_mission(5), connection, system=1)
-        assert report.verified
-        assert [part.attempts for part in report.parts] == [1]
-
-
 def test_connections_that_are_none() -> None:
     for text, told in (
         ("", "expected udpin:HOST:PORT"),

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
-from scenes import Scene
 from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry
 
 from faao_mav.errors import LinkError
@@ -168,14 +167,6 @@ def test_two_vehicles_of_one_number_are_not_one(monkeypatch: pytest.MonkeyPatch)
     assert [(mock.armed, mock.mission().items) for mock in vehicles.values()] == [(False, ())] * 2
 
 
-def test_nothing_is_started_that_has_a_namesake() -> None:
-    scene = Scene("px4", arm=True)
-    scene.watch.seen.strangers = {ELSEWHERE}
-    assert scene.run() == "refused"
-    assert ELSEWHERE in scene.watch.outcome.text
-    assert scene.orders == []
-
-
 def test_what_comes_later_from_elsewhere_does_not_count(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -195,27 +186,12 @@ def test_what_comes_later_from_elsewhere_does_not_count(
     assert {to for data, to in air.sent if message_id(data) != 111} == {HERE}  # not TIMESYNC
     (note,) = notes
     assert f"packets of system 1, component 1 come from {ELSEWHERE} too, not only from" in note
+    assert "If the vehicle's address has changed, begin again" in note
     logged, counts = mavutil.mavlink_connection(str(log)), 0
     while (message := logged.recv_match(type="MISSION_COUNT")) is not None:
         counts += message.get_srcSystem() == 1
     logged.close()
     assert counts == 1  # of what it was asked to give, by one vehicle
-
-
-def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A vehicle whose address changes in the middle is one that says nothing more."""
-    vehicles, notes = {HERE: a_mock(rate=0.0)}, list[str]()
-    in_the_air(monkeypatch, vehicles)
-
-    def observe(what: str, done: int, _: int) -> None:
-        if what.startswith("uploading") and done == 2 and HERE in vehicles:
-            vehicles[ELSEWHERE] = vehicles.pop(HERE)
-
-    hurry(monkeypatch)
-    report = upload(a_mission(9), "udpin:0.0.0.0:1", observe=observe, note=notes.append)
-    assert [part.verdict for part in report.parts] == ["silent"]
-    assert ELSEWHERE in notes[0]
-    assert "If the vehicle's address has changed, begin again" in notes[0]
 
 
 # ---- who speaks
