@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from faao_mav.errors import counted
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import FoundVehicle
 from faao_mav.wire.machine import Talk
@@ -53,19 +54,17 @@ class UploadReport:
             stands = f"{self.stands}{'' if self.stands.is_meant else ': it is not armed there'}"
         lines = [f"vehicle      {self.vehicle}", f"stands       {stands}"]
         lines += [f"parameter    {change}" for change in self.changes]
-        lines += [_stored(part) for part in self.parts if part.verified]
+        for part in self.parts:
+            if part.verified:
+                again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
+                stored = f"{counted(part.items, 'item')} stored{again}"
+                lines.append(f"{part.part.title.split()[0]:<13}{stored}")
         lines += [f"not kept     {text}" for part in self.parts for text in _dropped(part)]
         lines += [f"failed       {problem}" for problem in self.problems]
         if self.verified:
             took = f"the upload took {self.seconds:.1f} s"
             lines.append(f"verified     read back and compared; {took}")
         return "\n".join(lines)
-
-
-def _stored(part: PartReport) -> str:
-    title = {"rally points": "rally"}.get(part.part.title, part.part.title)
-    again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
-    return f"{title:<13}{part.items} item{'s' * (part.items != 1)} stored{again}"
 
 
 def _dropped(part: PartReport) -> list[str]:

@@ -97,21 +97,18 @@ def mission_of(
     """
     for mission_type, items in lists.items():
         for number, item in enumerate(items):
-            _check(item, f"{mission_type.title} item {number}")
+            name = f"{mission_type.title} item {number}"
+            if item.frame in GLOBAL_FRAMES:
+                check_place((item.x / 1e7, item.y / 1e7), name)
+            if any(map(math.isinf, (*item.params, item.z))):
+                told = f"params {item.params}, z {item.z}"
+                raise InputError(f"{name}: {told}; expected finite numbers")
     flown, fence, rally = (
         [mission_item(item) for item in lists.get(mission_type, ())] for mission_type in MissionType
     )
     mission = as_received(flown, home_row=bool(home_items(vehicle, MissionType.MISSION)))
     points = tuple(RallyPoint(item.x, item.y, item.z) for item in rally)
     return replace(mission, fence=fence_of(fence), rally=points)
-
-
-def _check(item: WireItem, name: str) -> None:
-    """Raise `InputError`, which names the item, for what is no place on Earth or infinite."""
-    if item.frame in GLOBAL_FRAMES:
-        check_place((item.x / 1e7, item.y / 1e7), name)
-    if any(map(math.isinf, (*item.params, item.z))):
-        raise InputError(f"{name}: params {item.params}, z {item.z}; expected finite numbers")
 
 
 def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
@@ -207,27 +204,22 @@ def _compare(
     part: MissionType,
     vehicle: VehicleType | None,
 ) -> Iterator[Difference]:
-    stored, unknown = sent, False
-    if vehicle is not None:
-        stored = vehicle.dialect.stored(sent)
-        unknown = part is MissionType.MISSION and not vehicle.dialect.is_known(sent.command)
-    of_sent, of_found, of_stored = map(_values, (sent, found, stored))
-    for field, was in of_sent.items():
-        is_, kept = of_found[field], of_stored[field]
+    flown = part is MissionType.MISSION
+    known = not flown or vehicle is None or vehicle.dialect.is_known(sent.command)
+    stored = sent if vehicle is None else vehicle.dialect.stored(sent)
+    values = [
+        (each.command, each.frame, each.autocontinue, *each.numbers)
+        for each in (sent, found, stored)
+    ]
+    for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
         unset = math.isnan(was) and is_ == 0
-        idle = field == "autocontinue" and part is not MissionType.MISSION
+        idle = field == "autocontinue" and not flown
         lost = _same(field, kept, is_, found.frame)
         if unset or idle or _same(field, was, is_, sent.frame) or (lost and field == "frame"):
             continue
         # What is not known to be kept may be lost, but not replaced.
-        lost = lost or (unknown and field not in ("frame", "x", "y", "command") and is_ == 0)
+        lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
         yield Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
-
-
-def _values(item: MissionItem) -> dict[str, float]:
-    """Return the numbers of an item by name."""
-    values = (item.command, item.frame, item.autocontinue, *item.numbers)
-    return dict(zip(_FIELDS, values, strict=True))
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:
