@@ -17,8 +17,7 @@ from faao_mav.mission.fence import Circle, Fence, Polygon, kind_of
 from faao_mav.mission.polygons import enclosed, polygonal, shortest_way
 from faao_mav.vector import Vector
 
-_SEGMENTS = 64
-"""Straights to a quarter of a circle: 0.075 mm of error a metre of radius."""
+_SEGMENTS = 64  # Straights to a quarter of a circle: 0.075 mm of error a metre of radius.
 
 OUTSIDE = 1 / math.cos(math.pi / (4 * _SEGMENTS))
 """The radius of the circle about a polygon of `_SEGMENTS`, in those of the circle inside it."""

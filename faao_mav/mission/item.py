@@ -1,8 +1,8 @@
-"""A mission as data: items and their jumps, home, fence, rally points; and as items to send."""
+"""A mission as data: items and their jumps, home, fence and rally points, and these as items."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from faao_mav.errors import InputError
@@ -25,8 +25,7 @@ MAX_ITEMS = 65_535
 """Items of a mission: MISSION_COUNT has 16 bits. PX4 keeps 65,534 on Linux and 2,000 elsewhere,
 ArduPilot 15 bytes for each in at most 64 kB of its card (BRD_SD_MISSION)."""
 
-_MAX_RALLY = 255
-"""Rally points of a mission: ArduPilot counts them in 8 bits; PX4 keeps 8."""
+_MAX_RALLY = 255  # Rally points of a mission: ArduPilot counts them in 8 bits; PX4 keeps 8.
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,42 +133,6 @@ def home_item(home: Home | None) -> MissionItem:
     """Return the row 0 that stands for `home`: zeros for none, and for an unknown altitude."""
     place = (0.0, 0.0, 0.0) if home is None else home.on_ground
     return _placed(Command.NAV_WAYPOINT, 0.0, *place)
-
-
-def as_sent(mission: Mission, *, home_row: bool) -> tuple[MissionItem, ...]:
-    """Return the items to send, the first as number 0.
-
-    With a home row (ArduPilot) row 0 is the home, zeros if there is none: the vehicle puts its
-    own there. Without one (PX4) the targets of DO_JUMP, which count items from 1, count from 0.
-
-    >>> takeoff = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, z=30.0)
-    >>> again = MissionItem(Command.DO_JUMP, Frame.MISSION, (1.0, 2.0, 0.0, 0.0))
-    >>> [row.command.name for row in as_sent(Mission((takeoff, again)), home_row=True)]
-    ['NAV_WAYPOINT', 'NAV_TAKEOFF', 'DO_JUMP']
-    >>> as_sent(Mission((takeoff, again)), home_row=False)[1].params[0]
-    0.0
-    """
-    if not home_row:
-        return tuple(jump_moved(item, -1) for item in mission.items)
-    return (home_item(mission.home), *mission.items)
-
-
-def as_received(rows: Sequence[MissionItem], *, home_row: bool) -> Mission:
-    """Return the mission that was read back as `rows`: the reverse of `as_sent`."""
-    if not home_row:
-        return Mission(tuple(jump_moved(item, 1) for item in rows))
-    if not rows:
-        return Mission(())
-    first = rows[0]
-    home = None if first.x == first.y == first.z == 0 else Home(first.x, first.y, first.z)
-    return Mission(tuple(rows[1:]), home)
-
-
-def jump_moved(item: MissionItem, by: int) -> MissionItem:
-    """Return `item` with the target of a DO_JUMP moved by so many rows; any other as it is."""
-    if item.command != Command.DO_JUMP:
-        return item
-    return replace(item, params=(item.params[0] + by, *item.params[1:]))
 
 
 JUMPS = (Command.DO_JUMP, Command.DO_JUMP_TAG)

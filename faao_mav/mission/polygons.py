@@ -15,8 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from faao_mav.arrays import Flags, Real
 
-_FLAT = 1e-9
-"""Share of its hull's area that a piece may lack and still count as convex: rounding."""
+_FLAT = 1e-9  # Share of its hull's area that a piece may lack and still count as convex: rounding.
 
 
 def shortest_way(area: BaseGeometry, start: Real, end: Real) -> Real | None:

@@ -23,8 +23,7 @@ from faao_mav.wire.protocol import (
 )
 from faao_mav.wire.transport import Origin
 
-_MAIN = 1
-"""MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system."""
+_MAIN = 1  # MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system.
 
 _BOOT = 60.0  # Seconds that a vehicle may boot. Chosen.
 

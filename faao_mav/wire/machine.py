@@ -27,8 +27,7 @@ _QUICKEST, _LONGEST = 0.02, 0.5
 loop, of which the slowest (ArduPlane's) has 50 a second; and at the latest on a quick link: chosen.
 """
 
-_GROWTH = 1.25
-"""By how much the wait grows with each question that has to be put again; chosen."""
+_GROWTH = 1.25  # By how much the wait grows with each question that has to be put again; chosen.
 
 
 class Machine(ABC, Generic[T]):

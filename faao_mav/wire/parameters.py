@@ -20,8 +20,7 @@ from faao_mav.wire.transfer import Peer
 Names: TypeAlias = tuple[str, ...]
 """The names that one parameter has in the generations of an autopilot: a vehicle has one."""
 
-_INT32 = 6
-"""MAV_PARAM_TYPE of whole numbers of 32 bits."""
+_INT32 = 6  # MAV_PARAM_TYPE of whole numbers of 32 bits.
 
 _AT_ONCE = 10  # Names that are asked for at once: half of ArduPilot's queue for them. Chosen.
 

@@ -92,8 +92,7 @@ def command_result(result: int) -> str:
     return _COMMAND_RESULTS.get(result, f"MAV_RESULT {result}")
 
 
-_SHOWN = 5
-"""Things that a message lists, at most; chosen."""
+_SHOWN = 5  # Things that a message lists, at most; chosen.
 
 
 def listed(things: Sequence[str]) -> str:

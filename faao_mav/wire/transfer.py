@@ -35,8 +35,7 @@ TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
 """Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
 nothing else is said."""
 
-_OPENING = -1
-"""The question that opens a transfer, where the others are the numbers of items."""
+_OPENING = -1  # The question that opens a transfer, where the others are the numbers of items.
 
 _TEXTS = 5  # The number of status texts that are kept, the last ones. Chosen.
 _REASONS = 1.5  # Seconds to wait after a refusal for the text that gives the reason. Chosen.

@@ -12,15 +12,22 @@ from typing import Literal
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.errors import InputError
-from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Frame
+from faao_mav.mission.command import (
+    ABOVE_HOME,
+    ABOVE_SEA,
+    ABOVE_TERRAIN,
+    FLOWN_TO,
+    Command,
+    Frame,
+)
 from faao_mav.mission.fence import RallyPoint, check_place
 from faao_mav.mission.item import (
+    Home,
     Mission,
     MissionItem,
-    as_received,
-    as_sent,
     fence_items,
     fence_of,
+    home_item,
     rally_items,
 )
 from faao_mav.wire.messages import WireItem
@@ -30,8 +37,7 @@ GLOBAL_FRAMES = ABOVE_SEA | ABOVE_HOME | ABOVE_TERRAIN
 """Frames whose coordinates are latitude and longitude."""
 
 _INT32 = range(-(2**31), 2**31)
-_FLOAT32 = 2.0**128 - 2.0**104
-"""The largest single-precision number."""
+_FLOAT32 = 2.0**128 - 2.0**104  # The largest single-precision number.
 
 _CENTIMETRE = 0.0101  # Altitudes that differ by less are equal, m: ArduPilot stores centimetres.
 _SINGLE = 2e-7  # The relative difference that single precision does not tell.
@@ -63,6 +69,7 @@ def wire_items(
 ) -> tuple[WireItem, ...]:
     """Return what `vehicle` is sent for one of the lists of `mission`.
 
+    With a home row, row 0 is the home, zeros if there is none: the vehicle puts its own there.
     Parameters that are not set (NaN) are 0 for an autopilot that refuses NaN. Raises `InputError`
     for a place to fly to that is not set, for a rally point without an altitude, and for numbers
     that the wire does not carry.
@@ -71,8 +78,10 @@ def wire_items(
         items = fence_items(mission.fence)
     elif mission_type is MissionType.RALLY:
         items = rally_items(mission.rally)
+    elif home_items(vehicle, mission_type):
+        items = (home_item(mission.home), *mission.items)
     else:
-        items = as_sent(mission, home_row=bool(home_items(vehicle, mission_type)))
+        items = tuple(_jump_moved(item, -1) for item in mission.items)
     first = 0 if mission_type is MissionType.MISSION else None
     return tuple(
         wire_item(_without_nan(item, index, vehicle), index, current=index == first)
@@ -106,9 +115,20 @@ def mission_of(
     flown, fence, rally = (
         [mission_item(item) for item in lists.get(mission_type, ())] for mission_type in MissionType
     )
-    mission = as_received(flown, home_row=bool(home_items(vehicle, MissionType.MISSION)))
+    home = None
+    if not home_items(vehicle, MissionType.MISSION):
+        flown = [_jump_moved(item, 1) for item in flown]
+    elif flown:
+        row, *flown = flown
+        home = Home(row.x, row.y, row.z) if row.x or row.y or row.z else None
     points = tuple(RallyPoint(item.x, item.y, item.z) for item in rally)
-    return replace(mission, fence=fence_of(fence), rally=points)
+    return Mission(tuple(flown), home, fence_of(fence), points)
+
+
+def _jump_moved(item: MissionItem, by: int) -> MissionItem:
+    if item.command != Command.DO_JUMP:
+        return item
+    return replace(item, params=(item.params[0] + by, *item.params[1:]))
 
 
 def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.dialect import SpeedChange
-from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.item import as_received, as_sent
+from faao_mav.mission import MissionItem
 
 COPTER, PLANE = Vehicle("ardupilot", "copter"), Vehicle("ardupilot", "plane")
 PX4 = Vehicle("px4", "copter")
@@ -138,23 +137,6 @@ def test_speed_changes() -> None:
     ):
         item = MissionItem(178, 2, (float(kind), speed, -1.0, 0.0))
         assert vehicle.type.dialect.speed_change(item) == change
-
-
-MISSION = Mission((waypoint(), MissionItem(177, 2, (1.0, 3.0, 0.0, 0.0))), Home(1.0, 2.0, 3.0))
-
-
-def test_home_is_sent_in_a_row_of_its_own_or_not_at_all() -> None:
-    home, *rows = as_sent(MISSION, home_row=COPTER.type.dialect.home_row)
-    assert (home.command, home.frame, home.x, home.y, home.z) == (16, 0, 1, 2, 3)
-    assert tuple(rows) == MISSION.items
-    rows = list(as_sent(MISSION, home_row=PX4.type.dialect.home_row))
-    assert rows[0] == MISSION.items[0]
-    assert rows[int(rows[1].params[0])] == rows[0]  # jumps count rows
-    for home_row in (True, False):
-        received = as_received(as_sent(MISSION, home_row=home_row), home_row=home_row)
-        assert received.items == MISSION.items
-        assert received.home == (MISSION.home if home_row else None)
-        assert as_received((), home_row=home_row) == Mission(())
 
 
 numbers = st.floats(-1e5, 1e5)

@@ -59,8 +59,10 @@ def test_home_is_row_0_of_ardupilot_and_no_row_of_px4() -> None:
     mission = Mission((*mission.items, jump), HOME)
     assert wire_items(mission, MISSION, vehicle_of("ardupilot"))[-1].params[0] == 1
     assert wire_items(mission, MISSION, vehicle_of("px4"))[-1].params[0] == 0
-    for firmware in ("ardupilot", "px4"):
-        assert there_and_back(mission, firmware).items[-1] == jump
+    for firmware, home in (("ardupilot", HOME), ("px4", None)):
+        found = there_and_back(mission, firmware)
+        assert (found.items[-1], found.home) == (jump, home)
+        assert mission_of({MISSION: ()}, vehicle_of(firmware)) == Mission(())
 
 
 def test_what_is_not_set_or_not_carried() -> None:

@@ -9,8 +9,7 @@ from faao_mav.mission.item import Mission
 
 _NAMES = ("param1", "param2", "param3", "param4", "latitude", "longitude", "altitude")
 
-_SHOWN_ITEMS = 5
-"""Values that a line names before it counts the rest; chosen to fit two lines."""
+_SHOWN_ITEMS = 5  # Values that a line names before it counts the rest; chosen to fit two lines.
 
 
 @dataclass(frozen=True, slots=True)

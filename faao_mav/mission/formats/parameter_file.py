@@ -22,14 +22,12 @@ ParameterStyle: TypeAlias = Literal["list", "qgroundcontrol"]
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: ten times what the largest autopilot has."""
 
-_AUTOPILOT = "1"
-"""MAV_COMP_ID_AUTOPILOT1: the component whose parameters are read and written."""
+_AUTOPILOT = "1"  # MAV_COMP_ID_AUTOPILOT1: the component whose parameters are read and written.
 
 _INT32, _REAL32 = 6, 9
 """MAV_PARAM_TYPE of what is written; those of 8, 16, 32 and 64 bits are read, integers up to 8."""
 
-_READ_ONLY = "@READONLY"
-"""What MAVProxy writes behind a parameter that cannot be set."""
+_READ_ONLY = "@READONLY"  # What MAVProxy writes behind a parameter that cannot be set.
 
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}", re.ASCII)
 _NAMED = "expected at most 16 capitals, digits and _"
