@@ -85,9 +85,9 @@ def read_held(
     """
     vehicle = peer.vehicle
     assert vehicle is not None
-    lists = yield from download_lists(parts, peer)
-    if MissionType.MISSION in lists.missing or not parameters:
-        return Held(lists.items, Reading({}), lists.missing)
+    lists, missing = yield from download_lists(parts, peer)
+    if MissionType.MISSION in missing or not parameters:
+        return Held(lists, Reading({}), missing)
     names = [tuple(each.names) for each in vehicle.parameters.values()]
     names += [(name,) for each in vehicle.failsafes for name in each.defaults]
     if vehicle.modes.guided is not None:
@@ -97,7 +97,7 @@ def read_held(
     home = None
     with suppress(InputError):
         home = None if told is None else home_in(told)
-    return Held(lists.items, reading, lists.missing, home)
+    return Held(lists, reading, missing, home)
 
 
 @dataclass(frozen=True, slots=True)

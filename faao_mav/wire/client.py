@@ -182,17 +182,17 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
 
         def read() -> Talk[tuple[Lists, HomePosition | None]]:
             lists, told = (yield from download_lists(tuple(MissionType), peer)), None
-            flown = lists.items.get(MissionType.MISSION)
+            flown = lists[0].get(MissionType.MISSION)
             if flown is not None and not flown[: home_items(peer.vehicle, MissionType.MISSION)]:
                 told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
             return lists, told
 
-        lists, told = session.run(read())
-        missing = {part: session.not_read(report) for part, report in lists.missing.items()}
+        (lists, unread), told = session.run(read())
+        missing = {part: session.not_read(report) for part, report in unread.items()}
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
         try:
-            mission = mission_of(lists.items, peer.vehicle)
+            mission = mission_of(lists, peer.vehicle)
             if told is not None:
                 mission = replace(mission, home=home_in(told))
         except InputError as error:

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from faao_mav.errors import counted
 from faao_mav.mission.item import Mission
@@ -78,12 +79,8 @@ def _dropped(part: PartReport) -> list[str]:
     ]
 
 
-@dataclass(frozen=True, slots=True)
-class Lists:
-    """What was downloaded; `missing` says why a list is not among `items`."""
-
-    items: dict[MissionType, tuple[WireItem, ...]]
-    missing: dict[MissionType, PartReport]
+Lists: TypeAlias = tuple[dict[MissionType, tuple[WireItem, ...]], dict[MissionType, PartReport]]
+"""The lists that were downloaded, and why others were not."""
 
 
 def upload_parts(
@@ -140,17 +137,17 @@ def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:
     A vehicle that has no fence or rally points at all is one that has none stored. Where not even
     the first list comes, and it is not refused, the others are not asked for.
     """
-    lists = Lists({}, {})
+    lists, missing = dict[MissionType, tuple[WireItem, ...]](), dict[MissionType, PartReport]()
     for part in types:
         report = yield from read_list(peer, part)
         absent = part is not MissionType.MISSION and report.result in _ABSENT
         if report.verdict == "accepted" or absent:
-            lists.items[part] = report.found
+            lists[part] = report.found
             continue
-        lists.missing[part] = report
-        if report.verdict != "refused" and not lists.items:
+        missing[part] = report
+        if report.verdict != "refused" and not lists:
             break
-    return lists
+    return lists, missing
 
 
 def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> str:

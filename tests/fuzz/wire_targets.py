@@ -19,7 +19,6 @@ from faao_mav.sim.faults import Faults
 from faao_mav.wire.codec import Codec, Framer
 from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.jobs import (
-    Lists,
     UploadReport,
     download_lists,
     explain,
@@ -143,8 +142,8 @@ def _hear(tape: bytes) -> object:
 def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
     """Say in every way what became of `job`, and return the verdicts on its lists."""
     outcome = job.outcome
-    if isinstance(outcome, Lists):
-        mission = mission_of(outcome.items, peer.vehicle)
+    if isinstance(outcome, tuple) and outcome and isinstance(outcome[0], dict):
+        mission = mission_of(outcome[0], peer.vehicle)
         for ending in (".waypoints", ".plan", ".kml"):
             render_files(mission, f"m{ending}")
     elif isinstance(outcome, tuple):

@@ -11,13 +11,10 @@ import re
 from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Literal
 
 from faao_mav.errors import ParameterFileError, quote
 from faao_mav.files import read_text
-
-ParameterStyle: TypeAlias = Literal["list", "qgroundcontrol"]
-"""`NAME,VALUE`, or QGroundControl's five fields."""
 
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: ten times what the largest autopilot has."""
@@ -101,7 +98,10 @@ def _parameter(content: str, where: str) -> tuple[str, float]:
 
 
 def render_parameters(
-    parameters: Mapping[str, float], style: ParameterStyle = "list", *, header: str = ""
+    parameters: Mapping[str, float],
+    style: Literal["list", "qgroundcontrol"] = "list",
+    *,
+    header: str = "",
 ) -> str:
     """Return the text of a parameter file, with the lines of `header` as comments before them.
 
