@@ -12,18 +12,20 @@ from nicegui import events, ui
 
 from faao_mav.app.answers import FILES, Answer, heights, made
 from faao_mav.app.document import Document, problems_of
-from faao_mav.app.fly import Fly
-from faao_mav.app.guard import TILES
-from faao_mav.app.panels import Form, Results, fields
+from faao_mav.app.panels import Fly, Form, Results, fields
 from faao_mav.app.scene import STATIONS, Scene
 from faao_mav.app.workers import Planner, Workers
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.plan.yaml_text import MAX_CHARACTERS
 
+TILES = "https://tile.openstreetmap.org"
+"""Where the background map comes from, if it is switched on."""
+
 _HINTS = {
-    "circle": "Click the center, then the edge; Esc ends.",
-    "polygon": "Click the corners, the last one twice; Esc ends.",
+    ("circle", "o_circle"): "Click the center, then the edge; Esc ends.",
+    ("polygon", "o_hexagon"): "Click the corners, the last one twice; Esc ends.",
 }
+"""How a zone of a shape, which a button with an icon begins, is drawn."""
 
 _OTHER_SHADE = "() => emit(!document.body.classList.contains('body--dark'))"
 """Tells whether the page is to be dark, where it is now light."""
@@ -36,7 +38,6 @@ _STATES = {
     "failed": "no flight",
 }
 """What the page says of the answer that it shows."""
-
 
 _LEAFLET = Path(nicegui.__file__).parent / "elements" / "leaflet" / "dist"
 """Leaflet as NiceGUI brings it along."""
@@ -109,10 +110,10 @@ class Page:
             for inside, name in ((False, "Stay out"), (True, "Stay in")):
                 with ui.element("div").classes("in" if inside else "out"):
                     ui.label(name)
-                    for shape, icon in (("circle", "o_circle"), ("polygon", "o_hexagon")):
-                        _button(icon, f"{name} of a {shape}" if not inside else f"{name} a {shape}",
-                                partial(call, "draw", shape, inside),
-                                partial(self._hint, _HINTS[shape]))  # fmt: skip
+                    for (shape, icon), hint in _HINTS.items():
+                        tip = f"{name} a {shape}" if inside else f"{name} of a {shape}"
+                        draw = partial(call, "draw", shape, inside)
+                        _button(icon, tip, draw, partial(self._hint, hint))
             _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
             _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
             shown = ui.switch(
@@ -123,11 +124,8 @@ class Page:
                 shown.tooltip("OpenStreetMap: the parts of the map that you look at are asked for "
                               f"from {TILES.removeprefix('https://')}")  # fmt: skip
         self._map.move(target_index=-1)
-        self._map.on("ready", self._ready)
-        self._map.on("moved", self._moved)
-        self._map.on("zone", self._moved)
-        self._map.on("removed", self._removed)
-        self._map.on("cursor", lambda e: self._cursor(e.args["at"]))
+        self._map.on("ready", self._ready).on("moved", self._moved).on("zone", self._moved)
+        self._map.on("removed", self._removed).on("cursor", lambda e: self._cursor(e.args["at"]))
         self._where = ui.label("Drag the stations and the ends, or draw zones.").classes("where")
         with ui.element("div").classes("time"):
             self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
@@ -160,7 +158,7 @@ class Page:
         self._undo.set_enabled(document.can_undo)
         self._redo.set_enabled(document.can_redo)
         self._save_button.set_enabled(document.path is not None and not document.saved)
-        self._fly.stale()
+        self._fly.show(None)
         self._results.stale()
         self._say("computing")
         self._planner.ask(document.text, document.source, soon=soon)
@@ -201,7 +199,8 @@ class Page:
         self._at_time()
         if answer.result is not None:
             self._results.show(answer.result)
-            self._fly.show(answer.result, self._plan_file)
+            document = self._document
+            self._fly.show(answer.result, document.path if document.saved else None)
 
     def _draw_scene(self, *, fit: bool = False) -> None:
         scene = Scene(self._document)
@@ -224,13 +223,15 @@ class Page:
         self._changed()
 
     def _cursor(self, at: list[float]) -> None:
-        if (frame := (scene := Scene(self._document)).frame) is None:
+        scene = Scene(self._document)
+        if (frame := scene.frame) is None:
             return
         here = frame.to_local(*at)
         text = f"{here[0]:.1f} m east, {here[1]:.1f} m north ({at[0]:.6f}, {at[1]:.6f})"
-        for station in (each for each in scene.stations() if each["key"] in ("base", "user")):
-            apart = np.hypot(*(here - frame.to_local(*station["at"])))
-            text += f"; {station['label'].lower()} {apart:.0f} m"
+        for station in scene.stations():
+            if station["key"] in ("base", "user"):
+                apart = np.hypot(*(here - frame.to_local(*station["at"])))
+                text += f"; {station['label'].lower()} {apart:.0f} m"
         self._hint(text)
 
     def _hint(self, text: str) -> None:
@@ -266,14 +267,13 @@ class Page:
             dialog.close()
             self._ready()
 
-        with ui.dialog() as dialog, ui.card():
+        with ui.dialog(value=True) as dialog, ui.card():
             ui.label("Open a plan")
             chosen = ui.upload(on_upload=opened, auto_upload=True, max_file_size=4 * MAX_CHARACTERS)
             chosen.props("accept=.yaml,.yml flat bordered")
-        dialog.open()
 
     def _save(self) -> None:
-        if self._document.path is None:
+        if (path := self._document.path) is None:
             ui.notify("This plan is of no file here: download it", type="warning")
             return
         try:
@@ -283,13 +283,8 @@ class Page:
             return
         self._save_button.set_enabled(False)
         if self._answer.result is not None:
-            self._fly.show(self._answer.result, self._plan_file)
-        ui.notify(f"{self._document.path.name} saved", type="positive")
-
-    @property
-    def _plan_file(self) -> Path | None:
-        """The file that has the plan as it is now, or None."""
-        return self._document.path if self._document.saved else None
+            self._fly.show(self._answer.result, path)
+        ui.notify(f"{path.name} saved", type="positive")
 
     def _download_plan(self) -> None:
         ui.download.content(self._document.text, Path(self._document.source).name)

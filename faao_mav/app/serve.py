@@ -1,7 +1,8 @@
-"""The server of the page and its background map: a port, and the address with the token in it."""
+"""The server of the page and its background map, and who may use it: who has the token alone."""
 
 import asyncio
 import contextlib
+import hmac
 import re
 import secrets
 import socket
@@ -9,49 +10,111 @@ import sqlite3
 import tempfile
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import uvicorn
-from fastapi import FastAPI, Response
+from fastapi import FastAPI
 from nicegui import ui
+from starlette.datastructures import MutableHeaders
+from starlette.requests import HTTPConnection
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
 
 from faao_mav.app.document import Document
-from faao_mav.app.guard import TILES, Guard
-from faao_mav.app.page import Page
+from faao_mav.app.page import TILES, Page
 from faao_mav.app.workers import Workers
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.processes import apart_from_the_current_directory
 
-LOOPBACK = ("127.0.0.1", "localhost")
-"""The names under which this machine reaches itself."""
-
+_LOOPBACK = ("127.0.0.1", "localhost")  # the names under which this machine reaches itself
 _TOKEN_BYTES = 24
-
-_PATIENCE = 30.0
-"""Seconds that a page which does not answer keeps its plan: then it is made anew. Chosen: a busy
-machine answers within that."""
-
-_GRACE = 2
-"""Seconds that a page which is open has to take its leave when the server ends. Chosen."""
-
+_PATIENCE = 30.0  # s that a page which does not answer keeps its plan. Chosen for a busy machine
+_GRACE = 2  # s that a page which is open has to take its leave when the server ends. Chosen
+_DEEPEST = 22  # the greatest zoom of the map: a pixel is 4 cm at the equator. Chosen
 
 _IMAGES = {"png": "image/png", "jpg": "image/jpeg", "jpeg": "image/jpeg", "webp": "image/webp"}
 """What tiles of a `format` are, as browsers name it; others are not pictures."""
 
-_DEEPEST = 22
-"""The greatest zoom of the map, at which a pixel is 4 cm at the equator. Chosen."""
-
-
-OPEN_STREET_MAP: dict[str, Any] = {
+_OPEN_STREET_MAP: dict[str, Any] = {
     "url": f"{TILES}/{{z}}/{{x}}/{{y}}.png",
     "attribution": '&copy; <a href="https://openstreetmap.org/copyright">OpenStreetMap</a> '
     "contributors",
     "deepest": 19,
 }
 """A background map: where its tiles are, who made it, and up to which zoom it has any."""
+
+
+_HEADERS = {
+    # Vue compiles templates and NiceGUI's scripts are inline; only tiles come from elsewhere
+    "content-security-policy": (
+        "default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; object-src 'none'; "
+        f"img-src 'self' data: blob: {TILES}; frame-ancestors 'none'; form-action 'self'; "
+        "base-uri 'self'"
+    ),
+    "referrer-policy": "strict-origin-when-cross-origin",
+    "x-content-type-options": "nosniff",
+}
+"""What the browser is told about the page."""
+
+
+class Guard:
+    """An ASGI application in front of another: it lets through what comes from its own page.
+
+    A request needs the `token`, in the address once and then in a cookie; other users of the
+    machine do not have it. It needs a Host among `hosts`, so that no other name leads here (DNS
+    rebinding), and a request that may change something, or opens a websocket, the Origin of this
+    host: a page from elsewhere cannot use the cookie.
+    """
+
+    def __init__(self, inner: ASGIApp, token: str, hosts: Iterable[str], port: int) -> None:
+        self._inner, self._token = inner, token
+        self._hosts = {f"{host}:{port}" for host in hosts}
+        self._cookie = f"faao-app-{port}"
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request, or hand it on."""
+        if scope["type"] not in ("http", "websocket"):  # start and end of the server
+            await self._inner(scope, receive, send)
+            return
+        asked = HTTPConnection(scope)
+        query = dict(asked.query_params)
+        given = query.pop("token", "")
+        answer: Response
+        if not self._from_here(asked):
+            answer = PlainTextResponse("this address is not used from other pages\n", 403)
+        elif scope["type"] == "http" and scope["method"] == "GET" and self._equal(given):
+            path = "/" + scope["path"].lstrip("/")
+            answer = RedirectResponse(f"{path}?{urlencode(query)}" if query else path, 303)
+            answer.set_cookie(self._cookie, self._token, httponly=True, samesite="lax")
+        elif self._equal(asked.cookies.get(self._cookie, "")):
+            await self._inner(scope, receive, _with_headers(send))
+            return
+        else:
+            answer = PlainTextResponse("open the address that faao-mission app printed\n", 403)
+        refusal = answer if scope["type"] == "http" else WebSocketClose(1008)
+        await refusal(scope, receive, send)
+
+    def _from_here(self, asked: HTTPConnection) -> bool:
+        host, origin = asked.headers.get("host", ""), asked.headers.get("origin")
+        reads = asked.scope["type"] == "http" and asked.scope["method"] in ("GET", "HEAD")
+        return host in self._hosts and (reads if origin is None else origin == f"http://{host}")
+
+    def _equal(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self._token.encode())
+
+
+def _with_headers(send: Send) -> Send:
+    async def sent(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            MutableHeaders(scope=message).update(_HEADERS)
+        await send(message)
+
+    return sent
 
 
 class TileFile:
@@ -126,7 +189,7 @@ def serve(
     @ui.page("/", title="faao-mission")
     def page() -> None:
         try:
-            Page(begin(), workers, tiles.background if tiles else OPEN_STREET_MAP).build()
+            Page(begin(), workers, tiles.background if tiles else _OPEN_STREET_MAP).build()
         except FaaoError as error:  # the file is another one by now
             ui.label(str(error))
 
@@ -148,7 +211,7 @@ def serve(
         reconnect_timeout=_PATIENCE,
     )
     here = f"[{host}]" if ":" in host else host
-    names = LOOPBACK if host in LOOPBACK else (here, *LOOPBACK)
+    names = _LOOPBACK if host in _LOOPBACK else (here, *_LOOPBACK)
     config = uvicorn.Config(
         Guard(inner, token, names, port),
         log_level="warning",

@@ -13,14 +13,13 @@ import typer
 from typer.core import TyperGroup
 
 import faao_mav.cli.shared as cli
-from faao_mav.cli.flights import debrief, fly
 from faao_mav.cli.link import link
 from faao_mav.cli.missions import convert, validate
 from faao_mav.cli.plan import plan
 from faao_mav.cli.serving import app as page
 from faao_mav.cli.serving import autopilot
 from faao_mav.cli.study import study
-from faao_mav.cli.transfers import download, upload
+from faao_mav.cli.vehicle import debrief, download, fly, upload
 from faao_mav.errors import HangUp
 
 _ALLOCATIONS = 50_000

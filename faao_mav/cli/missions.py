@@ -3,7 +3,6 @@
 import math
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +13,9 @@ from faao_mav.errors import InputError, printable
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
+    from faao_mav.autopilot import Vehicle
+    from faao_mav.mission.formats import MissionFile
+    from faao_mav.plan import Plan
     from faao_mav.validate import Check, Level, Rule
 
 
@@ -53,7 +55,6 @@ def validate(
     Exit status: 0 nothing is wrong; 1 errors, with --strict also warnings; 2 unusable arguments
     or a file that cannot be read.
     """
-    from faao_mav.cli.vehicle import choose_vehicle
     from faao_mav.validate import RULES, Level, Limits, check
 
     if rules:
@@ -72,7 +73,7 @@ def validate(
     solution = cli.planned(plan_file, solution_file)
     plan = solution.plan if solution is not None else None
     file = cli.read_noted(mission_file)
-    vehicle, chosen_by = choose_vehicle(mission_file, file, plan, (autopilot, kind, parameters))
+    vehicle, chosen_by = choose_vehicle(mission_file, file, plan, autopilot, kind, parameters)
     if vehicle.type.flight_model is not None:
         vehicle.flight_model()  # a useless parameter is refused, not left out of the judgement
     max_speed = plan.vehicle.max_speed if plan is not None else None
@@ -86,7 +87,7 @@ def validate(
         page = render_report(about, title=printable(mission_file.name))
         write_whole(report, page.encode())
     cli.show(
-        lambda: {"mission": str(mission_file), **_as_dict(found)},
+        lambda: {"mission": mission_file, **_as_dict(found)},
         lambda: _lines(f"{mission_file}", chosen_by, found),
         as_json=as_json,
     )
@@ -125,10 +126,73 @@ def convert(
     written = cli.write_noted(read.mission, out, plan_target(vehicle))
     items, names = len(read.mission.items), " and ".join(map(str, written.contents))
     cli.show(
-        lambda: {"items": items, "lost": written.lost, "written": str(out)},
+        lambda: {"items": items, "lost": written.lost, "written": out},
         lambda: [f"{items} items written to {names}"],
         as_json=as_json,
     )
+
+
+def choose_vehicle(
+    mission_file: Path,
+    file: "MissionFile",
+    plan: "Plan | None",
+    autopilot: str | None = None,
+    kind: str | None = None,
+    parameters: Path | None = None,
+) -> "tuple[Vehicle, str]":
+    """Return the vehicle that flies a mission, and what told which.
+
+    What --autopilot, --type and --parameters leave open the plan says, else the
+    mission's file, else the names of the parameters. The parameters are those asked for, else
+    those beside the mission, over the plan's own. Raises `InputError` for parameters of another
+    autopilot than the mission's, for files of several autopilots beside a mission that does not
+    say whose it is, and for a mission of a type of vehicle that is unknown here.
+    """
+    from faao_mav.autopilot import Vehicle, autopilots, families, kinds
+    from faao_mav.autopilot.files import MadeFor, autopilot_of, made_for, parameter_path
+    from faao_mav.mission.formats.parameter_file import read_parameters
+
+    planned = plan.aircraft if plan is not None else None
+    told = made_for(mission_file, file, planned)
+    given = read_parameters(parameters) if parameters is not None else None
+    if kind is None and told.kind is not None and told.kind not in kinds():
+        raise InputError(
+            f"{mission_file}: vehicleType {file.vehicle_type} (a MAV_TYPE) is not supported; "
+            f"--type {' or --type '.join(kinds())} says as which the mission is to be judged"
+        )
+    theirs = autopilot_of(given or ())
+    if planned is None and theirs is not None and (file.firmware is None or not told.autopilot):
+        told = MadeFor(theirs, told.kind, "as its parameters say")
+    whose, by = autopilot or told.autopilot, told.by
+    if whose is None:
+        found = {each: parameter_path(mission_file, each) for each in autopilots()}
+        beside = [each for each, path in found.items() if given is None and path.is_file()]
+        if len(beside) > 1:
+            raise InputError(
+                f"{' and '.join(str(found[each]) for each in beside)}: only one of them can belong "
+                f"to {mission_file}: remove the other, or give --autopilot"
+            )
+        whose, by = Vehicle().autopilot, "by default; --autopilot and --type say otherwise"
+        if beside:
+            whose, by = beside[0], f"as {found[beside[0]].name} beside it says"
+    if autopilot is not None or kind is not None:
+        by = "as asked"
+    base = planned if planned is not None and planned.autopilot == whose else Vehicle(whose)
+    values, source = base.parameters, base.source
+    if given is not None:
+        values, source = given, str(parameters)
+    elif (parameters := parameter_path(mission_file, whose)).is_file():
+        given = read_parameters(parameters)
+        values, source = {**values, **given}, f"{parameters}, beside the mission"
+        theirs = autopilot_of(given)
+    if theirs not in (None, whose):
+        raise InputError(
+            f"{parameters}: parameters of {families()[theirs].name}, but the mission is for "
+            f"{families()[whose].name} ({by}): give the vehicle's own (--parameters), or "
+            f"--autopilot {theirs}"
+        )
+    kind = kind or told.kind or base.kind
+    return Vehicle(whose, kind, values, source, base.body if kind == base.kind else None), by
 
 
 _COLOURS = {"error": "red", "warning": "yellow", "note": "cyan"}
@@ -150,10 +214,10 @@ def _as_dict(check: "Check") -> dict[str, Any]:
         "type": vehicle.kind,
         "parameters": vehicle.source if vehicle.parameters else None,
         "predicted": predicted,
-        "link": asdict(link) | more if link is not None else None,
+        "link": cli.plain(link) | more if link is not None else None,
         "energy": check.energy.as_dict() if check.energy else None,
         **{f"{level}s": len(check.of(level)) for level in Level},
-        "findings": [asdict(finding) for finding in check.findings],
+        "findings": check.findings,
     }
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 import faao_mav.cli.shared as cli
-from faao_mav.cli.transfers import as_dict, send
+from faao_mav.cli.vehicle import as_dict, send
 from faao_mav.errors import FaaoError, InputError
 
 if TYPE_CHECKING:

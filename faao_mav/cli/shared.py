@@ -173,11 +173,18 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
     check_apart(outputs, inputs)
 
 
+def plain(record: object, **options: Any) -> Any:
+    """Return what a `record` of dataclasses, files and numbers is in JSON, which has no NaN."""
+    from pydantic_core import to_jsonable_python
+
+    return to_jsonable_python(record, inf_nan_mode="null", **options)
+
+
 def show(
-    record: Callable[[], dict[str, Any]], lines: Callable[[], Iterable[str]], *, as_json: bool
+    record: Callable[[], object], lines: Callable[[], Iterable[str]], *, as_json: bool
 ) -> None:
     """Print what a command found: with --json its `record` as one object, else its `lines`."""
-    text = json.dumps(record(), allow_nan=False) if as_json else "\n".join(lines())
+    text = json.dumps(plain(record())) if as_json else "\n".join(lines())
     sys.stdout.write(f"{text}\n")  # typer.echo writes UTF-8 where ASCII is asked for
 
 

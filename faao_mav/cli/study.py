@@ -106,7 +106,7 @@ def study(
     written = _draw(rows, plan, along, out) if out is not None else []
     text = frontier_table(rows, plan, along) if along else comparison(rows)
     cli.show(
-        lambda: {"rows": [as_dict(row) for row in rows], "written": list(map(str, written))},
+        lambda: {"rows": [as_dict(row) for row in rows], "written": written},
         lambda: [text, *(f"written      {path}" for path in written)],
         as_json=as_json,
     )

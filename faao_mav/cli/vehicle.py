@@ -1,71 +1,292 @@
-"""Who flies a mission file: what tells, and in which order it is believed."""
+"""`faao-mission upload`, `download`, `fly`, `debrief`: what is done with a vehicle and its log."""
 
+import json
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from faao_mav.autopilot import Vehicle, autopilots, families, kinds
-from faao_mav.autopilot.files import MadeFor, autopilot_of, made_for, parameter_path
+import typer
+
+import faao_mav.cli.shared as cli
+from faao_mav.cli.missions import choose_vehicle
 from faao_mav.errors import InputError
-from faao_mav.mission.formats.parameter_file import read_parameters
+from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
-    from faao_mav.mission.formats import MissionFile
-    from faao_mav.plan import Plan
+    from faao_mav.mission.item import Mission
+    from faao_mav.wire.jobs import UploadReport
 
 
-def choose_vehicle(
-    mission_file: Path,
-    file: "MissionFile",
-    plan: "Plan | None",
-    asked: tuple[str | None, str | None, Path | None],
-) -> tuple[Vehicle, str]:
-    """Return the vehicle, and what told which.
+@cli.with_link
+def upload(
+    mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
+    to: str = cli.option("CONNECTION", cli.VEHICLE, default=...),
+    parameters: cli.File = cli.option(
+        "FILE", "Set the parameters that MISSION is timed for, first, and read them back."
+    ),
+    clear_rest: bool = cli.flag(
+        "--clear-rest", "Clear a fence and rally points that MISSION does not have."
+    ),
+    as_json: bool = cli.AS_JSON,
+    allow_armed: bool = cli.ALLOW_ARMED,
+    *,
+    link: dict[str, Any],
+) -> None:
+    """Upload a mission, read it back and compare.
 
-    `asked` are --autopilot, --type and --parameters. What they leave open the plan says, else the
-    mission's file, else the names of the parameters. The parameters are those asked for, else
-    those beside the mission, over the plan's own. Raises `InputError` for parameters of another
-    autopilot than the mission's, for files of several autopilots beside a mission that does not
-    say whose it is, and for a mission of a type of vehicle that is unknown here.
+    It says how far the vehicle stands from the mission's home, and how much higher or lower. A
+    mission for another autopilot or type of vehicle is not uploaded. --parameters sets what shapes
+    how a mission is flown, and nothing that decides about failsafes, fence, return or checks.
+
+    Exit status: 0 it is on the vehicle, whole and equal; 1 it is not, or that is not known; 2
+    unusable arguments or input.
     """
-    autopilot, kind, parameters = asked
-    planned = plan.aircraft if plan is not None else None
-    told = made_for(mission_file, file, planned)
-    given = read_parameters(parameters) if parameters is not None else None
-    if kind is None and told.kind is not None and told.kind not in kinds():
-        raise InputError(
-            f"{mission_file}: vehicleType {file.vehicle_type} (a MAV_TYPE) is not supported; "
-            f"--type {' or --type '.join(kinds())} says as which the mission is to be judged"
-        )
-    theirs = autopilot_of(given or ())
-    if planned is None and theirs is not None and (file.firmware is None or not told.autopilot):
-        told = MadeFor(theirs, told.kind, "as its parameters say")
-    whose, by = autopilot or told.autopilot, told.by
-    if whose is None:
-        found = {each: parameter_path(mission_file, each) for each in autopilots()}
-        beside = [each for each, path in found.items() if given is None and path.is_file()]
-        if len(beside) > 1:
-            raise InputError(
-                f"{' and '.join(str(found[each]) for each in beside)}: only one of them can belong "
-                f"to {mission_file}: remove the other, or give --autopilot"
-            )
-        whose, by = Vehicle().autopilot, "by default; --autopilot and --type say otherwise"
-        if beside:
-            whose, by = beside[0], f"as {found[beside[0]].name} beside it says"
-    if autopilot is not None or kind is not None:
-        by = "as asked"
-    base = planned if planned is not None and planned.autopilot == whose else Vehicle(whose)
-    values, source = base.parameters, base.source
-    if given is not None:
-        values, source = given, str(parameters)
-    elif (parameters := parameter_path(mission_file, whose)).is_file():
-        given = read_parameters(parameters)
-        values, source = {**values, **given}, f"{parameters}, beside the mission"
-        theirs = autopilot_of(given)
-    if theirs not in (None, whose):
-        raise InputError(
-            f"{parameters}: parameters of {families()[theirs].name}, but the mission is for "
-            f"{families()[whose].name} ({by}): give the vehicle's own (--parameters), or "
-            f"--autopilot {theirs}"
-        )
-    kind = kind or told.kind or base.kind
-    return Vehicle(whose, kind, values, source, base.body if kind == base.kind else None), by
+    from faao_mav.autopilot.files import made_for
+    from faao_mav.mission.formats.parameter_file import read_parameters
+    from faao_mav.wire.parameters import check_settable
+
+    file = cli.read_noted(mission_file)
+    values = None if parameters is None else read_parameters(parameters)
+    check_settable(values or (), parameters)
+    report = send(
+        file.mission,
+        to,
+        shown=sys.stderr.isatty() and not as_json,
+        allow_armed=allow_armed,
+        made_for=made_for(mission_file, file),
+        parameters=values,
+        clear_rest=clear_rest,
+        **link,
+    )
+    cli.show(lambda: as_dict(report), lambda: [str(report)], as_json=as_json)
+    if not report.verified:
+        raise typer.Exit(1)
+
+
+def send(mission: "Mission", to: str, *, shown: bool, **options: Any) -> "UploadReport":
+    """Upload a mission and verify it, with progress where that is `shown`; see `upload` there."""
+    from faao_mav.wire.client import upload as run
+
+    with cli.progress(shown=shown) as observe:
+        report = run(mission, to, observe=observe, **options)
+    if not report.verified:
+        cli.note("the mission is not verified; do not fly it")
+    return report
+
+
+def as_dict(report: "UploadReport") -> dict[str, Any]:
+    """Return `report` as JSON takes it."""
+    vehicle, stands = report.vehicle, report.stands
+    but = {"part": True, "said": True, "differences": {"__all__": {"part"}}}
+    return {
+        "verified": report.verified,
+        "vehicle": {
+            "system": vehicle.address.system,
+            "component": vehicle.address.component,
+            "autopilot": vehicle.autopilot,
+            "type": vehicle.kind,
+        },
+        "stands": stands and cli.plain(stands) | {"is_meant": stands.is_meant},
+        "parameters": cli.plain(report.changes),
+        "seconds": round(report.seconds, 3),
+        "problems": list(report.problems),
+        "lists": [
+            {"list": part.part.name.lower(), **cli.plain(part, exclude=but)}
+            for part in report.parts
+        ],
+    }
+
+
+@cli.with_link
+def download(
+    source: str = cli.option("CONNECTION", cli.VEHICLE, "--from", default=...),
+    out: Path = cli.option("MISSION", "Write the mission.", default=...),
+    *,
+    link: dict[str, Any],
+) -> None:
+    """Download the mission, fence and rally points of a vehicle.
+
+    A fence or rally points that do not come are told, and the rest is written.
+
+    Exit status: 0 done; 1 there is no such vehicle, or a list did not come whole; 2 unusable
+    arguments.
+    """
+    from faao_mav.autopilot import Vehicle
+    from faao_mav.autopilot.files import plan_target
+    from faao_mav.mission.formats import check_suffix
+    from faao_mav.wire.client import holdings
+
+    check_suffix(out)
+    cli.check_outputs({"--out": out}, {})
+    with cli.progress(shown=sys.stderr.isatty()) as observe:
+        held = holdings(source, observe=observe, **link)
+    found, mission = held.vehicle, held.mission
+    target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
+    written = cli.write_noted(mission, out, target)
+    told = {
+        "fence": f"{len(mission.fence.areas)} fence areas",
+        "rally points": f"{len(mission.rally)} rally points",
+    }
+    told |= {part: f"{part} not read" for part in mission.unread}
+    typer.echo(f"vehicle      {found}")
+    typer.echo(f"mission      {len(mission.items)} items, {', '.join(told.values())}")
+    for path in written.contents:
+        typer.echo(f"written      {path}")
+    for problem in held.problems:
+        cli.note(problem)
+    if held.problems:
+        raise typer.Exit(1)
+
+
+@cli.with_link
+def fly(
+    mission_file: Path = typer.Argument(metavar="MISSION", help="The mission file."),
+    to: str = cli.option("CONNECTION", cli.VEHICLE, default=...),
+    plan_file: cli.File = cli.PLAN_FILE,
+    solution_file: cli.File = cli.SOLUTION_FILE,
+    arm: bool = cli.flag("--arm", "Arm the vehicle and start the mission."),
+    stream: bool = cli.flag(
+        "--stream", "Fly the plan by setpoints instead of the mission; needs --arm."
+    ),
+    rate: float = cli.option("HZ", "Setpoints a second of --stream.", min=4, max=50, default=10.0),
+    elsewhere: bool = cli.flag(
+        "--elsewhere", "Arm it at another place, or height, than MISSION is made for."
+    ),
+    untimed: bool = cli.flag(
+        "--untimed", "Arm it with other parameters than MISSION is timed for."
+    ),
+    radio: str | None = cli.RADIO,
+    as_json: bool = cli.flag("--json", "Print JSON objects, one a line."),
+    *,
+    link: dict[str, Any],
+) -> None:
+    """Watch a vehicle fly a mission that it holds, to the end.
+
+    What the vehicle holds is compared with MISSION first. Then it says what stands against the
+    flight: where the vehicle stands, what it holds beside MISSION, its parameters, its battery, its
+    mode, what validation says with its own parameters; and what it does by itself on a loss. A line
+    a second tells mode, item and battery; with a plan also how late the flight is, how far from
+    plan and path (m), the rates of both hops, and what is delivered so far and by the end. It arms
+    and starts only with --arm, once nothing stands against the flight, the autopilot's own checks
+    pass and no other ground station is on the link. A pilot who changes
+    the mode has the aircraft: nothing more is sent. With --stream a copter that holds the mission
+    flies the trajectory of the plan by setpoints (GUIDED, Offboard), not the mission. Ctrl-C asks a
+    flight that was started here to hold, a second one leaves it; in other flights the first one
+    leaves.
+
+    Exit status: 0 the mission was flown to its end; 1 it was not, or that is not known; 2 unusable
+    arguments or input.
+    """
+    from faao_mav.autopilot.files import made_for
+    from faao_mav.fly.fly import fly_mission
+    from faao_mav.fly.preflight import Flight
+    from faao_mav.fly.telemetry import POSITION_RATE
+    from faao_mav.fly.telling import HEADER, Radios, Telling, as_text
+    from faao_mav.report.debrief import flight_lines
+    from faao_mav.report.summary import joined
+    from faao_mav.validate import predicted
+    from faao_mav.workflow import debriefing_as_dict
+
+    begun = False
+
+    def say(told: dict[str, Any]) -> None:
+        nonlocal begun
+        if not as_json and not begun and "note" not in told:
+            begun = True
+            typer.echo(HEADER)
+        typer.echo(json.dumps(cli.plain(told)) if as_json else as_text(told))
+
+    if stream and not arm:
+        raise InputError("--stream: needs --arm: it arms the vehicle, and flies it")
+    for name, given in (("--stream", stream), ("--radio", radio)):
+        if given and plan_file is None and solution_file is None:
+            raise InputError(f"{name}: needs --plan or --solution: the flight that is planned")
+    file = cli.read_noted(mission_file)
+    solution = cli.planned(plan_file, solution_file)
+    radios = Radios(solution, radio) if solution is not None and radio is not None else None
+    plan = solution.plan if solution is not None else None
+    vehicle, _ = choose_vehicle(mission_file, file, plan)
+    whose = made_for(mission_file, file, plan.aircraft if plan is not None else None)
+    flight = Flight(file.mission, vehicle, whose, solution, stream)
+    track = None
+    if not stream:
+        wind = plan.wind if plan is not None else (0.0, 0.0)
+        track, reason = predicted(file.mission, vehicle, wind)
+        if track is None:
+            cli.note(f"the flight is not predicted: {reason}")
+    telling = Telling(solution, track, radios, say)
+    rate = rate if stream else POSITION_RATE
+    if radios is not None and plan is not None:  # two positions for each slot at least
+        rate = max(rate, 2 / plan.flight.time_step)
+    report = fly_mission(
+        flight,
+        to,
+        arm=arm,
+        lands=track is None or track.lands,
+        elsewhere=elsewhere,
+        untimed=untimed,
+        rate=rate,
+        watching=telling,
+        **link,
+    )
+    ending, found = report.ending, telling.debriefing(report)
+    if as_json:
+        told = {
+            "ending": ending.kind if ending else "different",
+            "text": ending.text if ending else "the vehicle holds another mission",
+            "differences": [str(each) for each in report.differences],
+            "findings": report.findings,
+            "flight": debriefing_as_dict(found) if found else None,
+        }
+        typer.echo(json.dumps(cli.plain(told)))
+    elif lines := joined(flight_lines(report, found)):
+        typer.echo(lines)
+    if ending is None and not as_json:
+        cli.note("the vehicle holds another mission than the file: upload it first")
+    if ending is None or ending.kind != "finished":
+        raise typer.Exit(1)
+
+
+def debrief(
+    log: Path = typer.Argument(metavar="LOG", help="The log: .bin, .tlog or .ulg."),
+    plan_file: cli.File = cli.PLAN_FILE,
+    solution_file: cli.File = cli.SOLUTION_FILE,
+    system: int | None = cli.SYSTEM,
+    report: cli.File = cli.option("PAGE.html", "One page with all three tracks."),
+    radio: str | None = cli.RADIO,
+    as_json: bool = cli.AS_JSON,
+) -> None:
+    """Say what became of a plan, from the log of its flight.
+
+    Finds the relay flight in the log of an ArduPilot (.bin), a PX4 (.ulg, with pyulog) or a ground
+    station (.tlog), and tells how late it was, how far from plan and path, and what each hop
+    carried along the real track with the planned precoders, beside what was planned and predicted.
+    Of several vehicles in a .tlog it is the one whose flight is the plan's, or that of --system.
+    --radio replays the flight to radios, at the pace at which it was flown.
+
+    Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
+    """
+    if plan_file is None and solution_file is None:
+        raise InputError("--plan or --solution: give the plan that was flown")
+    inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
+    cli.check_outputs({"--report": report}, inputs)
+    from faao_mav.fly.logs import read_log
+    from faao_mav.fly.telling import Radios
+    from faao_mav.report.debrief import FromLog
+    from faao_mav.report.summary import joined
+    from faao_mav.workflow import Result, with_mission
+
+    records = read_log(log, system)  # what is no log is refused before the plan is solved
+    solution = cli.planned(plan_file, solution_file)
+    assert solution is not None
+    radios = None if radio is None else Radios(solution, radio)
+    told = FromLog.of(records, with_mission(Result(solution)), str(log))
+    if report is not None:
+        from faao_mav.report.page import render_report
+
+        page = render_report(told, title=log.name)
+        write_whole(report, page.encode())
+    cli.show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
+    if radios is not None:
+        count = radios.replay(told.record.line(solution, told.found.start))
+        cli.note(f"{count} slots were told to {radio}")

@@ -1,7 +1,6 @@
 """A link that was measured in flight: the fitted law, in lines, as a file and as a page."""
 
 import json
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -20,14 +19,9 @@ from faao_mav.report.summary import Line
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SHOWN = 20.0
-"""Residuals, dB, at which the map's colours end: thrice what shadowing leaves. Chosen."""
-
-_LEVELS = 16
-"""Colours on that map's scale. Chosen: their steps can hardly be seen."""
-
-_MOST_SHOWN = 2000
-"""Means that the page shows at most: a page of a megabyte. Chosen."""
+_SHOWN = 20.0  # dB left at which the map's colours end: thrice what shadowing leaves. Chosen
+_LEVELS = 16  # colours on that map's scale. Chosen: their steps can hardly be seen
+_MOST_SHOWN = 2000  # means that the page shows at most: a page of a megabyte. Chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,17 +54,16 @@ def law_text(fit: LinkFit) -> str:
 def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = None) -> LinkReport:
     """Return the report on a `fit`, and for the place of a `station` what it leaves, as a map.
 
-    A fit that is not `absolute` has a level within a constant. In the record errors are None where
+    A fit that is not `absolute` has a level within a constant. In the record errors are NaN where
     one leg tells none.
     """
-    error = [x if math.isfinite(x) else None for x in (*fit.errors, fit.error)]
-    lines = [*_fitted_lines(fit, absolute)]
-    record = {
+    lines = list(_fitted_lines(fit, absolute))
+    record: dict[str, Any] = {
         "reference_gain_db": fit.level if absolute else None,
         "exponent": fit.exponent,
-        "elevation_db": list(fit.elevation),
-        "errors": error[:-1],
-        "gain_error_db": error[-1],
+        "elevation_db": fit.elevation,
+        "errors": fit.errors,
+        "gain_error_db": fit.error,
         "spread_db": fit.spread,
         "paper_spread_db": fit.paper_spread,
         "correlation_m": fit.correlation,
@@ -83,17 +76,27 @@ def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = Non
     }
     if not fit.holds:
         return LinkReport(lines, record, "")
-    if station is None:
-        return LinkReport(lines, record, _fitted_law(fit, absolute))
-    above, alone, left = kriged(fit, station)
-    record |= {"left_out_db": alone, "left_out_map_db": left}
-    if above is None:
+    above = None
+    if station is not None:
+        above, alone, left = kriged(fit, station)
+        record |= {"left_out_db": alone, "left_out_map_db": left}
         told = f"none: no map tells legs that are left out better than the law, {alone:.1f} dB"
-    else:
-        fit = replace(fit, spread=left)
-        told = f"{left:.1f} dB at legs left out one by one, {alone:.1f} by the law alone; "
-        told += f"{_extent(above)} of the station's antenna"
-    return LinkReport([*lines, ("map", told)], record, _fitted_law(fit, absolute), above)
+        if above is not None:
+            fit = replace(fit, spread=left)
+            told = f"{left:.1f} dB at legs left out one by one, {alone:.1f} by the law alone; "
+            told += f"{_extent(above)} of the station's antenna"
+        lines.append(("map", told))
+    level = f"reference_gain_db: {fit.level:.2f}\n" if absolute else ""
+    terms = ", ".join(f"{term:.2f}" for term in fit.elevation)
+    (least, most), (near, far) = fit.elevation_deg, fit.distance_m
+    law = (
+        f"# {law_text(fit)}: d the distance, m, s the sine of the elevation\n"
+        f"about: {json.dumps(_rests_on(fit))}\n"
+        f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
+        f"spread_db: {fit.spread:.2f}\ncorrelation_m: {fit.correlation:.0f}\n"
+        f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
+    )
+    return LinkReport(lines, record, law, above)
 
 
 def _fitted_lines(fit: LinkFit, absolute: bool) -> Iterator[Line]:
@@ -117,19 +120,6 @@ def _fitted_lines(fit: LinkFit, absolute: bool) -> Iterator[Line]:
         told = f"of distance and elevation holds: {fit.spread:.1f} dB are left, more than "
         told += f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
         yield "no law", f"{told}stands about it, or fly higher"
-
-
-def _fitted_law(fit: LinkFit, absolute: bool) -> str:
-    level = f"reference_gain_db: {fit.level:.2f}\n" if absolute else ""
-    terms = ", ".join(f"{term:.2f}" for term in fit.elevation)
-    (least, most), (near, far) = fit.elevation_deg, fit.distance_m
-    return (
-        f"# {law_text(fit)}: d the distance, m, s the sine of the elevation\n"
-        f"about: {json.dumps(_rests_on(fit))}\n"
-        f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
-        f"spread_db: {fit.spread:.2f}\ncorrelation_m: {fit.correlation:.0f}\n"
-        f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
-    )
 
 
 def over_terrain(found: GainMap, megahertz: float, names: str) -> LinkReport:
@@ -182,10 +172,11 @@ def link_page(fit: LinkFit, report: LinkReport) -> str:
 
     every = -(-fit.count // _MOST_SHOWN)
     place = fit.place[::every]
-    level = np.concatenate([flight.level for flight in fit.flights])[::every]
+    measured = np.concatenate([flight.level for flight in fit.flights])[::every]
+    law = fit.gain_db(place)
     away, up = seen(place)
-    distance = _scatter(fit, place, level, away, "distance from the station, m", log=True)
-    elevation = _scatter(fit, place, level, up, "elevation, degrees")
+    distance = _scatter(away, measured, law, "distance from the station, m", log=True)
+    elevation = _scatter(up, measured, law, "elevation, degrees")
     over = "Measured and fitted gain over the"
     seen_at = f"{over} elevation at which the station sees the UAV"
     left = "Measured over fitted gain, dB, where it was flown, metres east and north of the station"
@@ -193,24 +184,23 @@ def link_page(fit: LinkFit, report: LinkReport) -> str:
         section("Link", facts(report.lines), "wide"),
         figure_section("Over distance", distance, f"{over} distance from the station's antenna"),
         figure_section("Over elevation", elevation, seen_at),
-        figure_section("Left by the law", _map(place, level - fit.gain_db(place)), left),
+        figure_section("Left by the law", _map(place, measured - law), left),
     ]
     return page("The link as it was measured", "\n".join(sections))
 
 
-def _scatter(
-    fit: LinkFit, place: Real, level: Real, x: Real, over: str, *, log: bool = False
-) -> "Figure":
+def _scatter(x: Real, measured: Real, law: Real, over: str, *, log: bool = False) -> "Figure":
+    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
+
     with drawing(WIDTH, 3.2) as figure:
         plot = figure.subplots()
-        plot.plot(x, level, ".", color=SERIES[0], markersize=2.5, alpha=0.4, label="measured")
-        plot.plot(x, fit.gain_db(place), ".", color=SERIES[1], markersize=2.5, label="fitted")
+        plot.plot(x, measured, ".", color=SERIES[0], markersize=2.5, alpha=0.4, label="measured")
+        plot.plot(x, law, ".", color=SERIES[1], markersize=2.5, label="fitted")
         if log:
             plot.set_xscale("log")
-            ticks = [m * 10.0**k for k in range(6) for m in (1, 2, 5)]
-            shown = [tick for tick in ticks if x.min() < tick < x.max()]
-            plot.set_xticks(shown, [f"{tick:g}" for tick in shown])
-            plot.set_xticks([], minor=True)
+            plot.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            plot.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            plot.xaxis.set_minor_locator(NullLocator())
         label(plot, "", over, "gain, dB")
         legend_above(plot)
     return figure

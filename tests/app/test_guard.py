@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-pytest.importorskip("starlette", reason="the extra app is not installed")
-from faao_mav.app.guard import Guard
+pytest.importorskip("nicegui", reason="the extra app is not installed")
+from faao_mav.app.serve import Guard
 
 TOKEN, HOST = "s3cret", "127.0.0.1:8000"
 COOKIE, HERE = f"faao-app-8000={TOKEN}", f"http://{HOST}"

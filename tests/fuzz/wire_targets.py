@@ -10,7 +10,7 @@ from simulate import Station, simulate
 from stations import FENCE, HOME, KINDS, RALLY, VEHICLE, peer_of
 from tapes import answer, converse, datagrams, mutated, packed, tape_of
 
-from faao_mav.cli.transfers import as_dict
+from faao_mav.cli.vehicle import as_dict
 from faao_mav.errors import FaaoError
 from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import render_files
