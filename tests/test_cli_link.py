@@ -1,6 +1,7 @@
 """`faao-mission link`: from logs of a flight to the file that a plan's `gain` names."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from conftest import SMALL, edited
 from flight_logs import dataflash, heard, tlog, ulog
 from typer.testing import CliRunner
 
+from faao_mav.arrays import Real
 from faao_mav.cli.main import app
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.problem import build_problem
@@ -39,11 +41,16 @@ def record(height: float, spread: float = 2.0, seed: int = 0) -> FlightRecord:
     return FlightRecord(t + 10.0, latitude, longitude, home + height, home, wind, count)
 
 
-def table(folder: Path, flight: FlightRecord, name: str = "flight.csv") -> Path:
-    path = folder / name
-    up = flight.altitude - flight.home
-    columns = (flight.t, flight.latitude, flight.longitude, up, flight.rssi / 1.9 - 127)
-    header = "time_s,latitude,longitude,altitude_m,rssi_dbm"
+def table(
+    folder: Path,
+    flight: FlightRecord,
+    column: str = "rssi_dbm",
+    of: Callable[[Real], Real] = lambda dbm: dbm,
+) -> Path:
+    """Write the table of a flight, with what is measured in a `column`, `of` the power, dBm."""
+    path, up = folder / "flight.csv", flight.altitude - flight.home
+    columns = (flight.t, flight.latitude, flight.longitude, up, of(flight.rssi / 1.9 - 127))
+    header = f"time_s,latitude,longitude,altitude_m,{column}"
     np.savetxt(path, np.stack(columns, axis=1), "%.8f", ",", header=header, comments="")
     return path
 
@@ -160,48 +167,38 @@ def test_terrain_tells_free_space_and_what_it_takes(tmp_path: Path) -> None:
 
 
 ORIGIN = ("latitude", "longitude", "elevation")
-FLAT = ("--terrain", "N47E008.hgt", "--station", PLACE)
+FLAT = f"--terrain N47E008.hgt --station {PLACE}"
+AT_900 = f"{FLAT} --frequency 900"
+REFUSED = f"""
+--station {PLACE} | expected LOG..., flights that were measured, or --terrain DEM
+x.csv {FLAT} | expected LOG..., flights that were measured, or --terrain DEM
+{FLAT} | --frequency: expected MHz, 30 to 100000, for --terrain
+{FLAT} --frequency 2.4 | --frequency: expected MHz, 30 to 100000
+{AT_900} --heights 60,40 | --heights 60,40: expected metres
+{AT_900} --heights 60,x | --heights 60,x: expected metres
+{AT_900} | N47E008.hgt: cannot be read
+{FLAT} --report a.html | --report: is about logs
+{FLAT} --map m.npz | --map: give --out, the file that names it
+{FLAT} --map m.csv --out a.yaml | --map m.csv: give a name
+flight.csv --station 1,2 | --station 1,2: expected LAT,LON,HEIGHT
+flight.csv --station 100,2,3 | expected LAT,LON,HEIGHT
+flight.csv --station 1,nan,3 | expected LAT,LON,HEIGHT
+flight.csv --station {PLACE} --unit rssi | --unit rssi: expected COLUMN=UNIT
+flight.csv --station {PLACE} --calibrate 3=x | --calibrate 3=x: expected COUNT=DBM
+flight.csv --station {PLACE} --calibrate 3=4 --calibrate 3=5 | two different counts
+flight.csv --station {PLACE} --out x.txt | x.txt
+flight.csv --station {PLACE} --unit rsi=dbm | --unit rsi: no such column; give one of time
+flight.csv --station {PLACE} --unit rssi=watt | 'watt'; name it in the header
+"""
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--station", PLACE], "expected LOG..., flights that were measured, or --terrain DEM"),
-        (["x.csv", *FLAT], "expected LOG..., flights that were measured, or --terrain DEM"),
-        ([*FLAT], "--frequency: expected MHz, 30 to 100000, for --terrain"),
-        ([*FLAT, "--frequency", "2.4"], "--frequency: expected MHz, 30 to 100000"),
-        ([*FLAT, "--frequency", "900", "--heights", "60,40"], "--heights 60,40: expected metres"),
-        ([*FLAT, "--frequency", "900", "--heights", "60,x"], "--heights 60,x: expected metres"),
-        ([*FLAT, "--frequency", "900"], "N47E008.hgt: cannot be read"),
-        ([*FLAT, "--report", "a.html"], "--report: is about logs"),
-        ([*FLAT, "--map", "m.npz"], "--map: give --out, the file that names it"),
-        (
-            [*FLAT, "--map", "m.csv", "--out", "a.yaml"],
-            "--map m.csv: give a name",
-        ),
-    ],
-)
-def test_unusable_arguments_of_maps_are_told(arguments: list[str], message: str) -> None:
-    assert message in " ".join(link(*arguments, status=2).split())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--station", "1,2"], "--station 1,2: expected LAT,LON,HEIGHT"),
-        (["--station", "100,2,3"], "expected LAT,LON,HEIGHT"),
-        (["--station", "1,nan,3"], "expected LAT,LON,HEIGHT"),
-        (["--station", PLACE, "--unit", "rssi"], "--unit rssi: expected COLUMN=UNIT"),
-        (["--station", PLACE, "--calibrate", "3=x"], "--calibrate 3=x: expected COUNT=DBM"),
-        (["--station", PLACE, "--calibrate", "3=4", "--calibrate", "3=5"], "two different counts"),
-        (["--station", PLACE, "--out", "x.txt"], "x.txt"),
-        (["--station", PLACE, "--unit", "rsi=dbm"], "--unit rsi: no such column; give one of time"),
-        (["--station", PLACE, "--unit", "rssi=watt"], "'watt'; name it in the header"),
-    ],
-)
-def test_unusable_arguments_are_told(tmp_path: Path, arguments: list[str], message: str) -> None:
-    path = table(tmp_path, record(60.0))
-    assert message in " ".join(link(path, *arguments, status=2).split())
+def test_unusable_arguments_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    table(tmp_path, record(60.0))
+    for line in REFUSED.strip().splitlines():
+        command, message = line.split(" | ")
+        assert message in " ".join(link(*command.split(), status=2).split())
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.csv"]
 
 
 def test_logs_without_a_radio_or_its_unit_are_told(tmp_path: Path) -> None:
@@ -213,30 +210,20 @@ def test_logs_without_a_radio_or_its_unit_are_told(tmp_path: Path) -> None:
     assert "no radio tells a level in it" in link(log, "--station", PLACE, status=2)
 
 
-def test_a_throughput_is_read_by_the_radios_rates(tmp_path: Path) -> None:
-    path, rates = table(tmp_path, record(60.0)), tmp_path / "rates.csv"
+def test_a_throughput_and_a_ratio_to_the_noise_are_read_as_the_gain(tmp_path: Path) -> None:
+    rates = tmp_path / "rates.csv"
     steps = np.arange(0.0, 60.0)
     rates.write_text("snr_db,mbit_per_s\n" + "".join(f"{x},{1 + x}\n" for x in steps))
-    rows = np.loadtxt(path, delimiter=",", skiprows=1)
-    snr = rows[:, 4] + 100.0
-    rows[:, 4] = np.where(snr < 0, 0.0, 1 + np.minimum(snr, 59.0))
-    header = "time_s,latitude,longitude,altitude_m,throughput_mbit_per_s"
-    np.savetxt(path, rows, "%.8f", ",", header=header, comments="")
-    told = link(
-        path, "--station", PLACE, "--power", 20, "--noise", -100, "--rates", rates, "--json"
-    )
-    assert json.loads(told)["reference_gain_db"] == pytest.approx(LAW[0], abs=1.5)
-    assert "give --rates" in link(path, "--station", PLACE, status=2)
 
+    def throughput(dbm: Real) -> Real:
+        return np.where(dbm < -100, 0.0, 1 + np.minimum(dbm + 100, 59.0))
 
-def test_a_ratio_to_the_noise_needs_both_powers(tmp_path: Path) -> None:
-    path = table(tmp_path, record(60.0))
-    rows = np.loadtxt(path, delimiter=",", skiprows=1)
-    rows[:, 4] += 100.0
-    header = "time_s,latitude,longitude,altitude_m,snr_db"
-    np.savetxt(path, rows, "%.8f", ",", header=header, comments="")
-    told = link(path, "--station", PLACE, "--power", 20, "--noise", -100, "--json")
-    assert json.loads(told)["reference_gain_db"] == pytest.approx(LAW[0], abs=1.5)
-    assert "give both --power and --noise" in link(
-        path, "--station", PLACE, "--power", 20, status=2
-    )
+    powers = ("--station", PLACE, "--power", 20)
+    for column, of, more, lacking in (
+        ("throughput_mbit_per_s", throughput, ("--rates", rates), "give --rates"),
+        ("snr_db", lambda dbm: dbm + 100, (), "give both --power and --noise"),
+    ):
+        path = table(tmp_path, record(60.0), column, of)
+        told = json.loads(link(path, *powers, "--noise", -100, *more, "--json"))
+        assert told["reference_gain_db"] == pytest.approx(LAW[0], abs=1.5)
+        assert lacking in link(path, *powers, status=2)

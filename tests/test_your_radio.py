@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,12 +44,6 @@ def written(folder: Path, changes: dict[str, Any], link: str = LINK) -> Path:
     return plan
 
 
-def refused(plan: Path) -> str:
-    with pytest.raises(PlanError) as caught:
-        read_plan(plan)
-    return str(caught.value)
-
-
 def test_a_law_of_a_file_is_that_of_both_hops_or_of_one(tmp_path: Path) -> None:
     both = read_plan(written(tmp_path, {"radio.gain": "link.yaml"}))
     for law in both.radio.path_gains:
@@ -59,40 +54,6 @@ def test_a_law_of_a_file_is_that_of_both_hops_or_of_one(tmp_path: Path) -> None:
     assert [law.square for law in one.radio.path_gains] == [True, False]
     assert one.radio.path_gains[0].reference_gain == one.radio.reference_gain
     assert one.radio.gain_laws[1].spread_db == 5.5
-
-
-@pytest.mark.parametrize(
-    ("link", "told"),
-    [
-        ("exponent: two\n", "link.yaml: exponent: 'two' is not accepted; give a number, 0 to 10"),
-        ("exponents: 2\n", "link.yaml: exponents: unknown key; did you mean exponent?"),
-        ("elevation_db: [1, 2, 3, 4]\n", "link.yaml: elevation_db: [1, 2, 3, 4] is not accepted"),
-        ("reference_gain_db: .nan\n", "link.yaml: reference_gain_db: nan is not a finite number"),
-        ("reference_gain_db: -20\nelevation_db: [90]\n", "radio.gain: 37.96 dB at 40 m"),
-        ("elevation_deg: [50, 2]\n", "the least is above the most; give two numbers [least, most]"),
-        ("elevation_deg: [2, 91]\n", "elevation_deg[1]: 91 is not accepted; give two numbers"),
-        ("elevation_deg: [2]\n", "link.yaml: elevation_deg"),
-        ("distance_m: [0, 9]\n", "distance_m[0]: 0 is not accepted; give two numbers"),
-        ("distance_m: [9, 1]\n", "distance_m: [9, 1]: the least is above the most"),
-        ("distance_m: 9\n", "distance_m: 9 is not accepted; give two numbers [least, most]"),
-        ("- 2.0\n", "link.yaml: "),
-        ("exponent: [2\n", "link.yaml: line 2"),
-    ],
-)
-def test_what_is_wrong_in_the_file_is_told_with_its_name(
-    tmp_path: Path, link: str, told: str
-) -> None:
-    message = refused(written(tmp_path, {"radio.gain": "link.yaml"}, link))
-    assert message.startswith(f"{tmp_path / 'plan.yaml'}: radio.gain: ")
-    assert told in message
-    assert len(message.splitlines()) == 1
-
-
-def test_a_file_that_is_not_there_and_no_law_at_all(tmp_path: Path) -> None:
-    assert "radio.gain: " in (message := refused(written(tmp_path, {"radio.gain": "other.yaml"})))
-    assert "other.yaml: cannot be read" in message
-    for value in (3, [2.0], True):
-        assert "or the name of a file" in refused(written(tmp_path, {"radio.gain": value}))
 
 
 def test_algorithm1_keeps_to_the_square_of_the_distance(paper_plan: MakePlan) -> None:
@@ -149,38 +110,6 @@ def test_a_map_stands_in_the_text_of_a_plan(tmp_path: Path) -> None:
         optimize(law.changed(SQUARE))
 
 
-@pytest.mark.parametrize(
-    ("arrays", "changes", "told"),
-    [
-        (MAP, {"flight.start": [-60, 0]}, "flight.start: [-60.0, 0.0] is off radio.gain.map: -50"),
-        (MAP, {"flight.end": [0, 400]}, "flight.end: [0.0, 400.0] is off radio.gain.map: -50 to 3"),
-        (MAP, {"radio.gain.exponent": 3}, "radio.gain.exponent: 3.0: radio.gain.map is the gain"),
-        (MAP, {"radio.gain.elevation_db": [1]}, "radio.gain.elevation_db: (1.0,): radio.gain.map"),
-        (MAP, {"radio.gain.reference_gain_db": -40}, "radio.gain.reference_gain_db: -40.0: "),
-        (MAP, {"radio.ground_user.velocity": [1, 0]}, "radio.ground_user: moves, and radio.gain.m"),
-        (MAP, {"radio.gain.map": 3}, "radio.gain.map: 3: no map; give the name of a .npz"),
-        (MAP, {"radio.gain.map": "npz:AA"}, "radio.gain.map: not the numbers of a map; expected"),
-        (MAP, {"radio.gain.map": "n.npz"}, "n.npz: cannot be read: No such file"),
-        (MAP | {"gain_db": np.full((2, 21, 21), 3.0)}, {}, "radio.gain.map: 3 dB is more than was"),
-        (MAP | {"gain_db": np.full((2, 21, 21), np.nan)}, {}, "radio.gain.map: no aircraft can be"),
-        (MAP | {"ground": np.full((21, 21), 99.0)}, {}, "no aircraft can be on it at 40 m (flight"),
-        (MAP | {"origin": np.array([47.0, 8.0])}, {}, "maps/m.npz: origin: 47, 8 lies "),
-        (
-            MAP | {"east": SIDE[:9]},
-            {},
-            "m.npz: gain_db: 2 x 21 x 21 of float64; expected 2 x",
-        ),
-    ],
-)
-def test_what_is_wrong_with_a_map_is_told(
-    tmp_path: Path, arrays: dict[str, Any], changes: dict[str, Any], told: str
-) -> None:
-    message = refused(mapped(tmp_path, arrays, {"radio.gain.map": "maps/m.npz"} | changes))
-    assert told in message
-    assert message.startswith(f"{tmp_path / 'plan.yaml'}: ")
-    assert len(message.splitlines()) == 1
-
-
 TABLE = """# two columns count
 mcs, SNR_dB, "mbit_per_s"
 2, 12, 26
@@ -208,59 +137,97 @@ def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> Non
     assert steps.rates == (6.5, 13, 26)
 
 
-@pytest.mark.parametrize(
-    ("table", "told"),
-    [
-        ("", "line 1: columns ''; give a header with snr_db and mbit_per_s, or"),
-        ("snr,rate\n1,2\n", "line 1: columns 'snr, rate'"),
-        ("snr_db,mbit_per_s,bit_per_s_per_hz\n1,2,3\n", "line 1: columns"),
-        ("# x\nsnr_db,mbit_per_s\n1,2\n3,fast\n", "line 4: mbit_per_s: 'fast' is no number"),
-        ("snr_db,mbit_per_s\n1\n", "line 2: mbit_per_s: '' is no number"),
-        ("snr_db,mbit_per_s\n1,nan\n", "mbit_per_s[0]: nan is not a finite number"),
-        ("snr_db,mbit_per_s\n1,-2\n", "mbit_per_s[0]: -2.0 is not accepted"),
-        ("snr_db,mbit_per_s\n1,0\n", "mbit_per_s: none is above 0"),
-        ("snr_db,mbit_per_s\n", "the rates are missing"),
-    ],
+WRONG_LAWS = (
+    ("exponent: two\n", "link.yaml: exponent: 'two' is not accepted; give a number, 0 to 10"),
+    ("exponents: 2\n", "link.yaml: exponents: unknown key; did you mean exponent?"),
+    ("elevation_db: [1, 2, 3, 4]\n", "link.yaml: elevation_db: [1, 2, 3, 4] is not accepted"),
+    ("reference_gain_db: .nan\n", "link.yaml: reference_gain_db: nan is not a finite number"),
+    ("reference_gain_db: -20\nelevation_db: [90]\n", "radio.gain: 37.96 dB at 40 m"),
+    ("elevation_deg: [50, 2]\n", "the least is above the most; give two numbers [least, most]"),
+    ("elevation_deg: [2, 91]\n", "elevation_deg[1]: 91 is not accepted; give two numbers"),
+    ("elevation_deg: [2]\n", "link.yaml: elevation_deg"),
+    ("distance_m: [0, 9]\n", "distance_m[0]: 0 is not accepted; give two numbers"),
+    ("distance_m: [9, 1]\n", "distance_m: [9, 1]: the least is above the most"),
+    ("distance_m: 9\n", "distance_m: 9 is not accepted; give two numbers [least, most]"),
+    ("- 2.0\n", "link.yaml: "),
+    ("exponent: [2\n", "link.yaml: line 2"),
 )
-def test_what_is_wrong_in_a_table_is_told(tmp_path: Path, table: str, told: str) -> None:
-    message = refused(tabled(tmp_path, table=table))
-    assert message.startswith(f"{tmp_path / 'plan.yaml'}: radio.rates")
-    assert told in message
-    assert len(message.splitlines()) == 1
-
-
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({"radio.bandwidth_mhz": None}, "give radio.bandwidth_mhz"),
-        ({"optimizer.precoder": "zf"}, "optimizer.precoder: zf: "),
-        ({"optimizer.rate": "mutual_information"}, "optimizer.rate: mutual_information: "),
-        ({"optimizer.method": "algorithm1"}, "optimizer.method: algorithm1: "),
-        ({"radio.rates": {"snr_db": [1, 2], "mbit_per_s": [1]}}, "1 for 2 of snr_db"),
-    ],
+WRONG_GAINS = (
+    ("other.yaml", "other.yaml: cannot be read"),
+    *((value, "or the name of a file") for value in (3, [2.0], True)),
 )
-def test_what_does_not_go_with_rates_of_the_radios_own(
-    tmp_path: Path, changes: dict[str, Any], told: str
-) -> None:
-    assert told in refused(tabled(tmp_path, changes))
+WRONG_MAPS: tuple[tuple[dict[str, Any], dict[str, Any], str], ...] = (
+    ({}, {"flight.start": [-60, 0]}, "flight.start: [-60.0, 0.0] is off radio.gain.map: -50"),
+    ({}, {"flight.end": [0, 400]}, "flight.end: [0.0, 400.0] is off radio.gain.map: -50 to 3"),
+    ({}, {"radio.gain.exponent": 3}, "radio.gain.exponent: 3.0: radio.gain.map is the gain"),
+    ({}, {"radio.gain.elevation_db": [1]}, "radio.gain.elevation_db: (1.0,): radio.gain.map"),
+    ({}, {"radio.gain.reference_gain_db": -40}, "radio.gain.reference_gain_db: -40.0: "),
+    ({}, {"radio.ground_user.velocity": [1, 0]}, "radio.ground_user: moves, and radio.gain.m"),
+    ({}, {"radio.gain.map": 3}, "radio.gain.map: 3: no map; give the name of a .npz"),
+    ({}, {"radio.gain.map": "npz:AA"}, "radio.gain.map: not the numbers of a map; expected"),
+    ({}, {"radio.gain.map": "n.npz"}, "n.npz: cannot be read: No such file"),
+    ({"gain_db": np.full((2, 21, 21), 3.0)}, {}, "radio.gain.map: 3 dB is more than was"),
+    ({"gain_db": np.full((2, 21, 21), np.nan)}, {}, "radio.gain.map: no aircraft can be"),
+    ({"ground": np.full((21, 21), 99.0)}, {}, "no aircraft can be on it at 40 m (flight"),
+    ({"origin": np.array([47.0, 8.0])}, {}, "maps/m.npz: origin: 47, 8 lies "),
+    ({"east": SIDE[:9]}, {}, "m.npz: gain_db: 2 x 21 x 21 of float64; expected 2 x"),
+)
+WRONG_TABLES = (
+    ("", "line 1: columns ''; give a header with snr_db and mbit_per_s, or"),
+    ("snr,rate\n1,2\n", "line 1: columns 'snr, rate'"),
+    ("snr_db,mbit_per_s,bit_per_s_per_hz\n1,2,3\n", "line 1: columns"),
+    ("# x\nsnr_db,mbit_per_s\n1,2\n3,fast\n", "line 4: mbit_per_s: 'fast' is no number"),
+    ("snr_db,mbit_per_s\n1\n", "line 2: mbit_per_s: '' is no number"),
+    ("snr_db,mbit_per_s\n1,nan\n", "mbit_per_s[0]: nan is not a finite number"),
+    ("snr_db,mbit_per_s\n1,-2\n", "mbit_per_s[0]: -2.0 is not accepted"),
+    ("snr_db,mbit_per_s\n1,0\n", "mbit_per_s: none is above 0"),
+    ("snr_db,mbit_per_s\n", "the rates are missing"),
+)
+WRONG_BESIDE_RATES: tuple[tuple[dict[str, Any], str], ...] = (
+    ({"radio.bandwidth_mhz": None}, "give radio.bandwidth_mhz"),
+    ({"optimizer.precoder": "zf"}, "optimizer.precoder: zf: "),
+    ({"optimizer.rate": "mutual_information"}, "optimizer.rate: mutual_information: "),
+    ({"optimizer.method": "algorithm1"}, "optimizer.method: algorithm1: "),
+    ({"radio.rates": {"snr_db": [1, 2], "mbit_per_s": [1]}}, "1 for 2 of snr_db"),
+)
 
 
-TEN: tuple[dict[str, Any], ...] = (
-    {},
+def test_what_is_wrong_in_a_file_or_with_it_is_told_in_one_line(tmp_path: Path) -> None:
+    mapping = {"radio.gain.map": "maps/m.npz"}
+
+    def cases() -> Iterator[tuple[Path, str]]:
+        for link, told in WRONG_LAWS:
+            yield written(tmp_path, {"radio.gain": "link.yaml"}, link), told
+        for value, told in WRONG_GAINS:
+            yield written(tmp_path, {"radio.gain": value}), told
+        for arrays, changes, told in WRONG_MAPS:
+            yield mapped(tmp_path, MAP | arrays, mapping | changes), told
+        for table, told in WRONG_TABLES:
+            yield tabled(tmp_path, table=table), told
+        for changes, told in WRONG_BESIDE_RATES:
+            yield tabled(tmp_path, changes), told
+
+    for plan, told in cases():
+        with pytest.raises(PlanError) as caught:
+            read_plan(plan)
+        message = str(caught.value)
+        assert told in message
+        assert message.startswith(f"{plan}: ")
+        assert len(message.splitlines()) == 1
+
+
+STAIRS: tuple[dict[str, Any], ...] = (
     {"radio.fading": "ergodic"},
-    {"radio.fading": "realization"},
+    {"radio.fading": "realization", "radio.relay.antennas": 1},
     {"radio.causal": True},
-    {"radio.causal": True, "radio.duplex": "half"},
+    {"radio.causal": True, "radio.duplex": "half", "flight.altitude": 80},
     {"radio.gain.elevation_db": [18, -30, 10]},
-    {"radio.gain.exponent": 2.2, "radio.reference_gain_db": -46},
-    {"radio.relay.antennas": 1},
-    {"flight.altitude": 80},
-    {"vehicle.max_speed": 8, "flight.duration": 20},
+    {"vehicle.max_speed": 8, "radio.gain.exponent": 2.2, "radio.reference_gain_db": -46},
 )
 FAINT = {"radio.base_station.power_dbm": -5, "radio.relay.power_dbm": -3, "flight.duration": 30}
 
 
-@pytest.mark.parametrize("changes", TEN)
+@pytest.mark.parametrize("changes", STAIRS)
 def test_what_is_priced_is_what_was_maximised(tmp_path: Path, changes: dict[str, Any]) -> None:
     """Steps along the flight, and the same that rise over half a decibel; no bound is below."""
     plan = read_plan(tabled(tmp_path, {"radio.fading": "none"} | FAINT | changes))

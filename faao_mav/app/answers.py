@@ -21,6 +21,7 @@ from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.zones import PolygonZone
+from faao_mav.report.figures import of_a_slot
 from faao_mav.report.maps import WAYPOINTS, placed_items
 from faao_mav.report.page import write_part
 from faao_mav.report.style import SPEEDS
@@ -41,17 +42,13 @@ FILES = {
 """What can be had of a finished answer: by its name, or for what lies beside a mission what is in
 its name, what it is called, and which part of `write_part` it is."""
 
-
-_HEIGHT, _ABOVE, _WIDE = 70, 50, 560
-"""Height of a plot and of what is above it, and from where on two are side by side, in pixels.
-Chosen."""
-
+_HEIGHT, _ABOVE = 70, 50  # pixels of a plot and of what is above it. Chosen
+_WIDE = 560  # pixels from which on two plots are side by side. Chosen
 _GREY = "#888"
 _COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a", "#c9a227", "#4a9aa8")
 """Of each curve, in the order of the plots, over and over."""
 
-_MOST_DRAWN = 400
-"""Points of a line on the map and of a chart; chosen: more cannot be told apart."""
+_MOST_DRAWN = 400  # points of a line on the map and of a chart: more cannot be told apart. Chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,16 +110,13 @@ def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str,
         return pairs
 
     speeds = lengths(flight.v)
-    drawn = {
+    drawn: dict[str, Any] = {
         "places": degrees(thinned(flight.w)),
         "times": thinned(flight.t).round(3).tolist(),
         "speeds": thinned(speeds).round(3).tolist(),
         "top": max(float(speeds.max()), 0.01),
         "shades": SPEEDS,
-        "track": [],
-        "waypoints": [],
-        "margin": [],
-        "zones": [],
+        **{name: [] for name in ("track", "waypoints", "margin", "zones")},
         "moving": [
             [kind, degrees(thinned(station.at(flight.t)))]
             for kind, station in zip(("base", "user"), plan.radio.stations, strict=True)
@@ -162,14 +156,12 @@ def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> dic
     plots = _plots(flight, under)
     axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
             "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
-    xs: list[dict[str, Any]] = []
     ys: list[dict[str, Any]] = []
     curves: list[dict[str, Any]] = []
     for k, (values, unit) in enumerate(plots):
         colours = (2 * _COLOURS)[len(curves) :]
         title = ", ".join(f"{{c{n}|━}} {name}" for n, name in enumerate(values))
         marks = {f"c{n}": {"color": colours[n], "fontWeight": "bold"} for n in range(len(values))}
-        xs.append({**axis, "gridIndex": k, "max": "dataMax"})
         ys.append({**axis, "gridIndex": k, "min": 0, "nameGap": 10, "name": f"{title}, {unit}",
                    "nameTextStyle": {"align": "left", "color": _GREY, "rich": marks}})  # fmt: skip
         for name, curve in values.items():
@@ -182,7 +174,7 @@ def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> dic
             "color": _COLOURS,
             "tooltip": {"trigger": "axis", "confine": True},
             "axisPointer": {"link": [{"xAxisIndex": "all"}]},
-            "xAxis": xs,
+            "xAxis": [{**axis, "gridIndex": k, "max": "dataMax"} for k in range(len(plots))],
             "yAxis": ys,
             "series": curves,
         },
@@ -204,9 +196,7 @@ def _plots(
 ) -> list[tuple[dict[str, Real], str]]:
     """Return the curves of each plot by name, and their unit."""
     plan, relayed = flight.plan, flight.relayed
-    bandwidth, held, unit = plan.radio.bandwidth_mhz, plan.flight.time_step, "bit/Hz"
-    if bandwidth is not None:
-        held, unit = held * bandwidth / 8, "MB"
+    held, unit = of_a_slot(plan)
     arrived = {"delivered": held * np.cumsum(relayed.forwarded)}
     if under is not None and plan.radio.causal:
         parts = {"more in 9 of 10": 0.1, "more in 1 of 10": 0.9}

@@ -25,8 +25,7 @@ T = TypeVar("T")
 _PRELOADED = ("faao_mav.app.answers", "scipy.interpolate", "shapely", "pyproj")
 """What a job would else import again: modules that `plan_mission` and the report page use."""
 
-_NICE = 10
-"""By how much long jobs give way to the page and to short ones. Chosen."""
+_NICE = 10  # by how much long jobs give way to the page and to short ones. Chosen
 
 _GRACE = 2.0
 """Seconds that a talk has to end by itself, as an upload that tells the vehicle that it is
@@ -165,23 +164,22 @@ class Planner:
         self._asked, self._answered = 0, 0  # numbers of questions, and of the last finished answer
         self._plan = ("", "")
         self._near: Real | None = None
-        self._rough: asyncio.Task[None] | None = None
-        self._finished: asyncio.Task[None] | None = None
+        self._tasks: dict[str, asyncio.Task[None]] = {}  # "rough" and "finished"
 
     def ask(self, text: str, source: str, *, soon: bool = True) -> None:
         """Ask for the answers to the plan `text`; not `soon`: without the rough ones."""
         self._asked, self._plan = self._asked + 1, (text, source)
-        if soon and (self._rough is None or self._rough.done()):
-            self._rough = asyncio.create_task(self._answer_roughly())
-        if self._finished is not None:
-            self._finished.cancel()
-        self._finished = asyncio.create_task(self._finish(_REST if soon else 0.0))
+        tasks = self._tasks
+        if soon and ("rough" not in tasks or tasks["rough"].done()):
+            tasks["rough"] = asyncio.create_task(self._answer_roughly())
+        if "finished" in tasks:
+            tasks["finished"].cancel()
+        tasks["finished"] = asyncio.create_task(self._finish(_REST if soon else 0.0))
 
     def close(self) -> None:
         """Ask for nothing any more."""
-        for task in (self._rough, self._finished):
-            if task is not None:
-                task.cancel()
+        for task in self._tasks.values():
+            task.cancel()
 
     async def _answer_roughly(self) -> None:
         question = 0
@@ -205,7 +203,6 @@ class Planner:
 
 
 async def _told(job: Awaitable[Answer]) -> Answer:
-    """Return the answer of `job`, or the error in its stead."""
     try:
         return await job
     except Exception as error:  # a page that waits for ever says nothing

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from faao_mav.report.debrief import FromLog
 
-
 _COLOURS = {"planned": SERIES[0], "predicted": SERIES[1], "flown": SERIES[2]}
 """Of the curves of these names, in all plots; of others by their order."""
 
@@ -40,12 +39,14 @@ class Shown(NamedTuple):
 class _Plot(NamedTuple):
     """A plot over time, s: what it shows with the unit, and by their names curves.
 
-    A curve is its times and values; `limits` are values that the curves are to keep.
+    A curve is its times and values; `limits` are values that the curves are to keep; a `band` has
+    its name, its times, and the values between which it lies.
     """
 
     what: str
     curves: Mapping[str, tuple[Real, Real]]
     limits: Mapping[str, float] = MappingProxyType({})
+    band: tuple[str, Real, Real, Real] | None = None
 
 
 def flight_figure(
@@ -131,7 +132,7 @@ def plan_figures(result: Result, log: "FromLog | None" = None) -> Iterator[Shown
     yield Shown("Motion", _figure(_speed(solution, conversion), acceleration), title)
     hops = _figure(*_hops(solution, flights), sharey=True)
     yield Shown("Link", hops, "Rates of both links over time")
-    held, unit = _of_a_slot(plan)
+    held, unit = of_a_slot(plan)
     waiting = {name: (t, held * flight.relayed.queue) for name, flight in flights.items()}
     buffer = {"buffer": most} if (most := plan.radio.relay.buffer_mbytes) else {}
     half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
@@ -140,7 +141,7 @@ def plan_figures(result: Result, log: "FromLog | None" = None) -> Iterator[Shown
     if (under := result.shadowed) is not None:
         title = f"What has arrived over time, as {rate} counts it: planned without shadowing; "
         title += "with it the median, and in the band eight of ten, one above, one below"
-        yield Shown("What arrives", _arrival(solution, under), title)
+        yield Shown("What arrives", _figure(_arrival(solution, under)), title)
     begun, ended = solution.history[0], solution.history[-1]
     title = f"{rate} after each iteration, from {begun:.4f} to {ended:.4f} bit/s/Hz"
     yield Shown("Convergence", _convergence(solution), title)
@@ -148,21 +149,14 @@ def plan_figures(result: Result, log: "FromLog | None" = None) -> Iterator[Shown
     yield Shown("Precoders", _precoder_power(solution), title)
 
 
-def _arrival(solution: Solution, under: Shadowed) -> "Figure":
+def _arrival(solution: Solution, under: Shadowed) -> _Plot:
     """Return what has arrived over time: planned, and under shadowing with a band of 0.1 to 0.9."""
-    held, unit = _of_a_slot(solution.plan)
+    held, unit = of_a_slot(solution.plan)
     t = solution.t + solution.plan.flight.time_step
     planned = arriving(solution.problem, np.stack([solution.I_U, solution.I_G]), solution.shares)
-    with drawing(WIDTH, 2.6) as figure:
-        plot = figure.subplots()
-        plot.plot(t, held * planned, color=SERIES[0], label="planned")
-        low, half, high = (held * under.arrived[part] for part in (0.1, 0.5, 0.9))
-        plot.fill_between(t, low, high, color=SERIES[1], alpha=0.25, lw=0, label="8 of 10")
-        plot.plot(t, half, color=SERIES[1], label="median")
-        plot.set_ylim(bottom=0.0)
-        label(plot, "", "time, s", f"arrived, {unit}")
-        legend_above(plot)
-    return figure
+    low, half, high = (held * under.arrived[part] for part in (0.1, 0.5, 0.9))
+    curves = {"planned": (t, held * planned), "median": (t, half)}
+    return _Plot(f"arrived, {unit}", curves, band=("8 of 10", t, low, high))
 
 
 def _precoder_power(solution: Solution) -> "Figure":
@@ -202,7 +196,7 @@ def _convergence(solution: Solution) -> "Figure":
     return figure
 
 
-def _of_a_slot(plan: Plan) -> tuple[float, str]:
+def of_a_slot(plan: Plan) -> tuple[float, str]:
     """Return how much a bit/s/Hz is over a slot: bits per hertz, or megabytes with a bandwidth."""
     megahertz, step = plan.radio.bandwidth_mhz, plan.flight.time_step
     return (step, "bit/Hz") if megahertz is None else (step * megahertz / 8, "megabytes")
@@ -258,6 +252,9 @@ def _draw(column: "list[Axes]", *plots: _Plot) -> None:
     for axes, plot in zip(column, plots, strict=True):
         for name, value in plot.limits.items():
             axes.axhline(value, color=MUTED, linestyle=":", linewidth=1.2, label=name)
+        if plot.band is not None:
+            name, t, low, high = plot.band
+            axes.fill_between(t, low, high, color=SERIES[1], alpha=0.25, lw=0, label=name)
         for k, (name, (t, values)) in enumerate(plot.curves.items()):
             colour = _COLOURS.get(name, SERIES[k % len(SERIES)])
             (line,) = axes.plot(t, values, color=colour, label=name)
