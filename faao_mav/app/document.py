@@ -24,8 +24,7 @@ _INDENT = re.compile(r"^( +)[^\s#-]", re.MULTILINE)
 _BEFORE_DASH = re.compile(r"^( *)[^\s#-][^\n]*:[ ]*\n( *)- ", re.MULTILINE)
 """How far a text indents the keys of a section, and a list's dashes from the list's key."""
 
-_WIDTH = 4096
-"""Characters of a line at which long values are folded. Chosen."""
+_WIDTH = 4096  # characters of a line at which long values are folded. Chosen
 
 
 class Document:

@@ -13,7 +13,7 @@ from nicegui import events, ui
 from faao_mav.app.document import Document
 from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watched
 from faao_mav.app.workers import Workers, said, talk
-from faao_mav.fly.telling import as_text
+from faao_mav.fly.fly import as_text
 from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.report.summary import result_lines
 from faao_mav.validate import Finding

@@ -1,6 +1,7 @@
 """What of a plan's text is on the map: stations, ends and zones, and what dragging them writes."""
 
 import math
+from contextlib import suppress
 from typing import Any
 
 from faao_mav.app.document import Document, Path
@@ -18,8 +19,7 @@ STATIONS: dict[str, tuple[Path, str]] = {
 _ZONES = ("inclusion", "exclusion")
 """The lists of a fence. The key of a zone is the name of its list and its number there."""
 
-_METRES, _DEGREES = 2, 8
-"""Decimals that dragging writes: 1 cm, and 1 mm in degrees. Chosen."""
+_METRES, _DEGREES = 2, 8  # decimals that dragging writes: 1 cm, and 1 mm in degrees. Chosen
 
 
 class Scene:
@@ -32,10 +32,8 @@ class Scene:
         self._document = document
         origin = document.value(("site", "origin"))
         self.frame: LocalFrame | None = None
-        try:
+        with suppress(FaaoError, TypeError, KeyError, ValueError):
             self.frame = LocalFrame(float(origin["latitude"]), float(origin["longitude"]))
-        except (FaaoError, TypeError, KeyError, ValueError):
-            return
 
     def stations(self) -> list[dict[str, Any]]:
         """Return key, name and [latitude, longitude] of stations and ends."""
@@ -124,15 +122,13 @@ class Scene:
 
     def _degrees(self, value: object) -> list[float] | None:
         """Return [latitude, longitude] of a position as a plan writes it; None if it is none."""
-        try:
+        with suppress(KeyError, TypeError, ValueError):
             if isinstance(value, dict):
                 return [float(value["latitude"]), float(value["longitude"])]
             if isinstance(value, list) and self.frame is not None:
                 east, north = map(float, value)
                 found = [float(x) for x in self.frame.to_geodetic((east, north))]
                 return found if all(map(math.isfinite, found)) else None
-        except (KeyError, TypeError, ValueError):
-            return None
         return None
 
     def _metres(self, at: list[float]) -> list[float]:

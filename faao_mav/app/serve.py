@@ -231,15 +231,12 @@ def serve(
 
 
 def _bound(host: str, port: int) -> socket.socket:
+    """Return a socket that listens: who comes before the server has begun waits for it."""
     try:
-        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        listening = socket.socket(family, kind)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listening.bind(address)
-        listening.listen()  # who comes before the server has begun waits for it
+        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(address, family=family)
     except OSError as error:
         raise InputError(f"--host {host} --port {port}: {error.strerror or error}") from None
-    return listening
 
 
 @contextlib.contextmanager

@@ -7,19 +7,21 @@ that fly. Everything here takes and returns what can be sent between processes.
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from faao_mav.app.answers import thinned
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.report.summary import joined
-from faao_mav.schedule.conversion import Conversion, beyond_vehicle
+from faao_mav.schedule.conversion import beyond_vehicle
 from faao_mav.workflow import Result
 
+if TYPE_CHECKING:
+    from faao_mav.fly.preflight import Flight
+
 MISSION = "mission.plan"
-"""The downloaded file that `fly_command` names: the fence and the kind of vehicle are in it. `fly`
-starts nothing on a vehicle that holds another mission."""
+"""The downloaded file that `fly_command` names: the fence and the kind of vehicle are in it."""
 
 Tell = Callable[[dict[str, Any]], object]
 """What a talk tells the page: a `note`, what it is `doing`, or how a flight stands."""
@@ -41,17 +43,15 @@ def fly_command(connection: str, plan: Path | None) -> str:
     return shlex.join([*words, "--arm"])
 
 
-def _to_fly(result: Result) -> Conversion:
-    """Return the mission of `result`, to be put on a vehicle.
+def _to_fly(result: Result) -> "Flight":
+    """Return the flight of the mission of `result`; `PlanError` where there is none to upload."""
+    from faao_mav.fly.preflight import Flight
 
-    What the command line would not upload is not returned: `PlanError` for a mission with errors,
-    and for that of a plan beyond its vehicle.
-    """
     if beyond := beyond_vehicle(result.solution.plan):
         raise PlanError("\n".join(beyond))
     if result.conversion is None or not result.flyable:
         raise PlanError("the mission does not pass validation; do not fly it")
-    return result.conversion
+    return Flight.planned(result.conversion, result.solution)
 
 
 def uploaded(tell: Tell, look: Callable[[], None], result: Result, connection: str) -> str:
@@ -60,14 +60,13 @@ def uploaded(tell: Tell, look: Callable[[], None], result: Result, connection: s
     Nothing is armed or started. `look` raises KeyboardInterrupt to cancel the upload. Raises what
     `upload` raises.
     """
-    from faao_mav.fly.preflight import Flight
     from faao_mav.wire.client import upload
 
     def observe(what: str, done: int, total: int) -> None:
         look()
         tell({"doing": f"{what}, {done} of {total}" if total else what})
 
-    flight = Flight.planned(_to_fly(result), result.solution)
+    flight = _to_fly(result)
     report = upload(
         flight.mission,
         connection,
@@ -87,7 +86,6 @@ def watched(tell: Tell, look: Callable[[], None], result: Result, connection: st
     given what a `Telling` says; `look` raises KeyboardInterrupt to leave the flight.
     """
     from faao_mav.fly.fly import Telling, fly_mission
-    from faao_mav.fly.preflight import Flight
     from faao_mav.fly.watch import Watch
     from faao_mav.report.debrief import flight_lines
 
@@ -95,11 +93,11 @@ def watched(tell: Tell, look: Callable[[], None], result: Result, connection: st
         telling(watch)
         look()
 
-    conversion = _to_fly(result)
+    flight = _to_fly(result)
     track = result.check.track if result.check is not None else None
     telling = Telling(result.solution, track, None, tell)
     report = fly_mission(
-        Flight.planned(conversion, result.solution),
+        flight,
         connection,
         lands=track is None or track.lands,
         watching=watching,

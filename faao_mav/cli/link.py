@@ -2,7 +2,6 @@
 
 import json
 import os
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -80,26 +79,23 @@ def link(
     Exit status: 0 fitted; 1 no law holds, nothing is written but the page; 2 unusable arguments or
     input.
     """
+    from faao_mav.radio.map_file import map_archive
+    from faao_mav.report.summary import joined
+
     wanted = f"--station {station}: expected LAT,LON,HEIGHT, degrees and m"
     place = cli.read_numbers(station, 3, wanted)
     if abs(place[0]) > 90 or abs(place[1]) > 180:
         raise InputError(wanted)
-    units = {}
-    for each in unit or []:
-        column, _, told = each.partition("=")
-        units[column] = told
+    units = dict(each.partition("=")[::2] for each in unit or ())
+    for column, told in units.items():
         if not told:
-            raise InputError(f"--unit {each}: expected COLUMN=UNIT, as in rssi=dbm")
+            raise InputError(f"--unit {column}: expected COLUMN=UNIT, as in rssi=dbm")
     points = [
         cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
-        for each in calibrate or []
+        for each in calibrate or ()
     ]
     if len(points) > 2 or len({count for count, *_ in points}) < len(points):
         raise InputError("--calibrate: expected one or two different counts")
-    inputs: dict[str, Path | None] = {
-        "--rates": rates,
-        **{f"LOG {path}": path for path in logs or ()},
-    }
     if out is not None:
         check_ending(out, "--out", (".yaml", ".yml"))
         map_file = map_file or (out.with_suffix(".npz") if terrain else None)
@@ -107,11 +103,13 @@ def link(
         check_ending(map_file, "--map", (".npz",))
         if out is None:
             raise InputError("--map: give --out, the file that names it")
+    inputs = {f"LOG {path}": path for path in logs or ()}
     inputs |= {f"--terrain {path}": path for path in terrain or ()}
-    cli.check_outputs({"--out": out, "--map": map_file, "--report": report}, inputs)
+    outputs = {"--out": out, "--map": map_file, "--report": report}
+    cli.check_outputs(outputs, {"--rates": rates, **inputs})
     if bool(logs) == bool(terrain):
         raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
-    written = []
+    written: list[Path] = []
     if terrain:
         if report is not None:
             raise InputError("--report: is about logs; leave it out with --terrain")
@@ -129,28 +127,21 @@ def link(
         found = fitted(fit, power is not None, place if map_file is not None else None)
         if report is not None:
             write_whole(report, link_page(fit, found).encode())
-            written.append(str(report))
+            written.append(report)
     if out is not None and found.law:
-        contents: dict[str | Path, bytes] = {out: found.law.encode()}
+        law, contents = found.law, dict[str | Path, bytes]()
         if found.above is not None and map_file is not None:
-            from faao_mav.radio.map_file import map_archive
-
-            name = json.dumps(os.path.relpath(map_file, out.parent))
-            contents = {
-                map_file: map_archive(found.above),
-                out: f"{found.law}map: {name}\n".encode(),
-            }
+            contents[map_file] = map_archive(found.above)
+            law += f"map: {json.dumps(os.path.relpath(map_file, out.parent))}\n"
+        contents[out] = law.encode()
         write_together(contents)
-        written = [*map(str, reversed(contents)), *written]
-    from faao_mav.report.summary import joined
-
+        written = [*map(Path, reversed(contents)), *written]
     cli.show(
         lambda: found.record | {"written": written},
-        lambda: [joined([*found.lines, ("files", ", ".join(written) or "none")])],
+        lambda: [joined([*found.lines, ("files", ", ".join(map(str, written)) or "none")])],
         as_json=as_json,
+        good=bool(found.law),
     )
-    if not found.law:
-        raise typer.Exit(1)
 
 
 def _over_terrain(
@@ -178,7 +169,7 @@ def _over_terrain(
             cli.note(
                 f"{path}: {unknown:,} heights are not known and taken from the nearest that are"
             )
-    with cli.progress(shown=sys.stderr.isatty()) as observe:
+    with cli.progress() as observe:
         found = terrain_map(rasters, station, 1e6 * frequency, levels, *size, observe)
     return over_terrain(found, frequency, ", ".join(path.name for path in paths))
 

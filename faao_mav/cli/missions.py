@@ -90,9 +90,8 @@ def validate(
         lambda: {"mission": mission_file, **_as_dict(found)},
         lambda: _lines(f"{mission_file}", chosen_by, found),
         as_json=as_json,
+        good=not found.of(Level.ERROR) and not (strict and found.of(Level.WARNING)),
     )
-    if found.of(Level.ERROR) or (strict and found.of(Level.WARNING)):
-        raise typer.Exit(1)
 
 
 def convert(

@@ -1,6 +1,5 @@
 """`faao-mission PLAN.yaml --out MISSION`: from a plan to a mission file."""
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,12 +56,11 @@ def plan(
         given = "--allow-armed" if system is None else f"--system {system}"
         raise InputError(f"{given}: is for an upload; give --upload CONNECTION too")
     files = {"--save": save, "--precoders": precoders, "--report": report, "--figure": figure}
-    shown = sys.stderr.isatty() and not quiet
     to_fly = out is not None or upload is not None
     if force and not to_fly:
         raise InputError("--force: is for a mission; give --out MISSION or --upload CONNECTION too")
     plan = _checked_plan(plan_file, method, out, files, upload, force)
-    with cli.optimizer_progress(shown=shown) as observe:
+    with cli.optimizer_progress(quiet=quiet) as observe:
         result = plan_mission(plan, bound=bound, observe=observe)
         for name, path in files.items():
             if path is not None:
@@ -79,7 +77,7 @@ def plan(
         flight = Flight.planned(result.conversion, result.solution)
         options = {"system": system, "allow_armed": allow_armed, "made_for": flight.made_for}
         try:
-            uploaded = send(flight.mission, upload, shown=shown, **options)
+            uploaded = send(flight.mission, upload, quiet=quiet, **options)
         except FaaoError as error:  # told after the result
             failure = error
     if not quiet or as_json:

@@ -160,12 +160,13 @@ def _diary() -> "Callable[[MockAutopilot], None]":
     told: dict[str, object] = {}
 
     def observe(mock: "MockAutopilot") -> None:
-        now: dict[str, object] = {part.title: mock.lists.items(part) for part in MissionType}
-        now["armed"] = mock.armed
-        for name, value in now.items():
-            if value != told.setdefault(name, value):
-                rows = f"{name}: {len(value)} rows" if isinstance(value, tuple) else ""
-                typer.echo(rows or ("armed" if value else "disarmed"))
-        told.update(now)
+        for part in MissionType:
+            rows = mock.lists.items(part)
+            if rows != told.setdefault(part.title, rows):
+                typer.echo(f"{part.title}: {len(rows)} rows")
+            told[part.title] = rows
+        if mock.armed != told.setdefault("armed", mock.armed):
+            typer.echo("armed" if mock.armed else "disarmed")
+        told["armed"] = mock.armed
 
     return observe

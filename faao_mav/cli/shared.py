@@ -181,11 +181,20 @@ def plain(record: object, **options: Any) -> Any:
 
 
 def show(
-    record: Callable[[], object], lines: Callable[[], Iterable[str]], *, as_json: bool
+    record: Callable[[], object],
+    lines: Callable[[], Iterable[str]],
+    *,
+    as_json: bool,
+    good: bool = True,
 ) -> None:
-    """Print what a command found: with --json its `record` as one object, else its `lines`."""
+    """Print what a command found: with --json its `record` as one object, else its `lines`.
+
+    What is not `good` ends the command with the exit status 1.
+    """
     text = json.dumps(plain(record())) if as_json else "\n".join(lines())
     sys.stdout.write(f"{text}\n")  # typer.echo writes UTF-8 where ASCII is asked for
+    if not good:
+        raise typer.Exit(1)
 
 
 def note(message: str) -> None:
@@ -210,17 +219,17 @@ def planned(plan_file: Path | None, solution_file: Path | None) -> "Solution | N
     from faao_mav.plan import read_plan
 
     plan = read_plan(plan_file)
-    with optimizer_progress(shown=sys.stderr.isatty()) as observe:
+    with optimizer_progress() as observe:
         return optimize(plan, observe=observe)
 
 
 @contextmanager
-def progress(*, shown: bool) -> "Iterator[Observe]":
+def progress(*, quiet: bool = False) -> "Iterator[Observe]":
     """Give what draws a line on a terminal: what is done, how much of it, of how much (0: open).
 
-    It is on standard error while there is work, if anything is `shown`.
+    It is on standard error while there is work, unless that is to be `quiet`.
     """
-    if not shown:
+    if quiet or not sys.stderr.isatty():
         yield lambda *_: None
         return
     from rich import progress
@@ -236,9 +245,9 @@ def progress(*, shown: bool) -> "Iterator[Observe]":
 
 
 @contextmanager
-def optimizer_progress(*, shown: bool) -> "Iterator[Observer]":
+def optimizer_progress(*, quiet: bool = False) -> "Iterator[Observer]":
     """Give an observer of the work on a plan."""
-    with progress(shown=shown) as draw:
+    with progress(quiet=quiet) as draw:
 
         def observe(now: "Progress") -> None:
             best = f", {now.best_rate:.4f} bit/s/Hz" if now.best_rate else ""

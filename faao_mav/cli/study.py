@@ -1,7 +1,6 @@
 """`faao-mission study PLAN.yaml`: one plan with many values, schemes and seeds."""
 
 import itertools
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,7 +89,7 @@ def study(
     else:
         raise refused[0]
     try:
-        with cli.progress(shown=sys.stderr.isatty()) as draw:
+        with cli.progress() as draw:
             done = itertools.count(1)
 
             def observe(row: "StudyRow") -> None:
@@ -109,9 +108,8 @@ def study(
         lambda: {"rows": [as_dict(row) for row in rows], "written": written},
         lambda: [text, *(f"written      {path}" for path in written)],
         as_json=as_json,
+        good=not all(row.error for row in rows),
     )
-    if all(row.error for row in rows):
-        raise typer.Exit(1)
 
 
 def _draw(rows: "Sequence[StudyRow]", plan: "Plan", along: str | None, out: Path) -> list[Path]:

@@ -1,7 +1,6 @@
 """`faao-mission upload`, `download`, `fly`, `debrief`: what is done with a vehicle and its log."""
 
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -51,23 +50,22 @@ def upload(
     report = send(
         file.mission,
         to,
-        shown=sys.stderr.isatty() and not as_json,
+        quiet=as_json,
         allow_armed=allow_armed,
         made_for=made_for(mission_file, file),
         parameters=values,
         clear_rest=clear_rest,
         **link,
     )
-    cli.show(lambda: as_dict(report), lambda: [str(report)], as_json=as_json)
-    if not report.verified:
-        raise typer.Exit(1)
+    told = (lambda: as_dict(report)), (lambda: [str(report)])
+    cli.show(*told, as_json=as_json, good=report.verified)
 
 
-def send(mission: "Mission", to: str, *, shown: bool, **options: Any) -> "UploadReport":
-    """Upload a mission and verify it, with progress where that is `shown`; see `upload` there."""
+def send(mission: "Mission", to: str, *, quiet: bool, **options: Any) -> "UploadReport":
+    """Upload a mission and verify it, with progress unless `quiet`; see `upload` there."""
     from faao_mav.wire.client import upload as run
 
-    with cli.progress(shown=shown) as observe:
+    with cli.progress(quiet=quiet) as observe:
         report = run(mission, to, observe=observe, **options)
     if not report.verified:
         cli.note("the mission is not verified; do not fly it")
@@ -118,7 +116,7 @@ def download(
 
     check_suffix(out)
     cli.check_outputs({"--out": out}, {})
-    with cli.progress(shown=sys.stderr.isatty()) as observe:
+    with cli.progress() as observe:
         held = holdings(source, observe=observe, **link)
     found, mission = held.vehicle, held.mission
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
@@ -178,10 +176,9 @@ def fly(
     arguments or input.
     """
     from faao_mav.autopilot.files import made_for
-    from faao_mav.fly.fly import fly_mission
+    from faao_mav.fly.fly import HEADER, Radios, Telling, as_text, fly_mission
     from faao_mav.fly.preflight import Flight
     from faao_mav.fly.telemetry import POSITION_RATE
-    from faao_mav.fly.telling import HEADER, Radios, Telling, as_text
     from faao_mav.report.debrief import flight_lines
     from faao_mav.report.summary import joined
     from faao_mav.validate import predicted
@@ -270,8 +267,8 @@ def debrief(
         raise InputError("--plan or --solution: give the plan that was flown")
     inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     cli.check_outputs({"--report": report}, inputs)
+    from faao_mav.fly.fly import Radios
     from faao_mav.fly.logs import read_log
-    from faao_mav.fly.telling import Radios
     from faao_mav.report.debrief import FromLog
     from faao_mav.report.summary import joined
     from faao_mav.workflow import Result, with_mission

@@ -21,8 +21,7 @@ from faao_mav.workflow import Result, debriefing_as_dict, with_mission
 if TYPE_CHECKING:
     from faao_mav.fly.fly import FlightReport
 
-_SAME = 1e-5
-"""Relative difference of two parameters that single precision does not tell apart."""
+_SAME = 1e-5  # relative difference of parameters that single precision does not tell apart
 
 
 def flight_lines(report: "FlightReport", found: Debriefing | None) -> Iterator[Line]:
@@ -99,8 +98,8 @@ class FromLog:
         estimated it; `parameters` that are other than the mission is timed for, with the value in
         the log and that; and the `radio`.
         """
-        known, plan = self.record.parameters, self.result.solution.plan
-        wind = self.record.mean_wind(self.found.start, plan.flight.duration)
+        known, duration = self.record.parameters, self.result.solution.plan.flight.duration
+        wind = self.record.mean_wind(self.found.start, duration)
         return debriefing_as_dict(self.found) | {
             "wind": None if wind is None else wind.tolist(),
             "parameters": {
@@ -117,11 +116,13 @@ class FromLog:
         yield from _debriefing_lines(self.found)
         told = self.as_dict()
         if radio := told["radio"]:
-            levels = f"{counted(radio['levels'], 'level')} of a telemetry radio"
-            apart = f"{radio['base_station_db']:.1f} dB rms from the planned gain of the base "
-            apart += f"station, {radio['ground_user_db']:.1f} of the ground user"
-            law = "faao-mission link fits a law to them"
-            yield "radio", f"{levels}: their shape is {apart}; {law}"
+            yield (
+                "radio",
+                f"{counted(radio['levels'], 'level')} of a telemetry radio: their shape is "
+                f"{radio['base_station_db']:.1f} dB rms from the planned gain of the base station, "
+                f"{radio['ground_user_db']:.1f} of the ground user; "
+                "faao-mission link fits a law to them",
+            )
         if len(self.records) > 1:
             others = ", ".join(str(r.system) for r in self.records if r is not self.record)
             yield "vehicle", f"system {told['system']}, by its flight; also in the log: {others}"
@@ -130,8 +131,8 @@ class FromLog:
         else:
             east, north = told["wind"]
             start = math.degrees(math.atan2(-east, -north)) % 360
-            speed = f"{math.hypot(east, north):.1f} m/s"
-            yield "wind", f"{speed} from {start:.0f} degrees, as estimated"
+            speed = math.hypot(east, north)
+            yield "wind", f"{speed:.1f} m/s from {start:.0f} degrees, as estimated"
         held = self._timed.keys() & self.record.parameters.keys()
         if other := told["parameters"]:
             text = ", ".join(f"{name} {was:g} (not {due:g})" for name, (was, due) in other.items())
@@ -152,17 +153,19 @@ class FromLog:
         That is the rms difference, dB, within a constant and by the steps of SiK radios, of both
         hops. None where it told none on the way.
         """
-        plan = self.result.solution.plan
-        flight = self.record.line(self.result.solution, self.found.start)
+        solution, plan = self.result.solution, self.result.solution.plan
+        flight = self.record.line(solution, self.found.start)
         told = np.isfinite(self.record.rssi) & (flight.t >= 0) & (flight.t < plan.flight.duration)
         if not told.any():
             return None
-        w, t = flight.w[told], flight.t[told]
-        links = zip(self.result.solution.problem.links, plan.radio.stations, strict=True)
-        apart = [
-            self.record.rssi[told] * SIK_STEP
-            - replace(link.gains, station=station.at(t)).log(w.T) / PER_DB
-            for link, station in links
-        ]
-        base, user = (float(np.std(each)) for each in apart)
-        return {"levels": int(told.sum()), "base_station_db": base, "ground_user_db": user}
+        w, level = flight.w[told], self.record.rssi[told] * SIK_STEP
+        found: dict[str, Any] = {"levels": int(told.sum())}
+        for name, link, station in zip(
+            ("base_station_db", "ground_user_db"),
+            solution.problem.links,
+            plan.radio.stations,
+            strict=True,
+        ):
+            gains = replace(link.gains, station=station.at(flight.t[told]))
+            found[name] = float(np.std(level - gains.log(w.T) / PER_DB))
+        return found

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 """The page's Content-Security-Policy: its own style, and nothing from elsewhere."""
 
-_PARTS = ("faao-mav", "numpy", "scipy", "matplotlib")
-"""The packages whose versions the page names."""
-
 
 def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
     """Return the page about a planned flight, a mission that was checked, or a flight in a log.
@@ -64,10 +61,9 @@ def write_part(result: Result, part: str, path: Path) -> None:
 def page(title: str, content: str) -> str:
     """Return a whole page of sections, offline, for light, dark, phone and paper."""
     title = escape(title)
-    made_by = [
-        *(f"{name} {version(name)}" for name in _PARTS),
-        f"Python {platform.python_version()}",
-    ]
+    packages = ("faao-mav", "numpy", "scipy", "matplotlib")
+    made_by = [f"{name} {version(name)}" for name in packages]
+    made_by.append(f"Python {platform.python_version()}")
     style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
     return f"""<!doctype html>
 <html lang="en">

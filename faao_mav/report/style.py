@@ -32,21 +32,15 @@ SERIES = ("#1769aa", "#c2500a", "#16825d", "#9a3d9c", "#8a6d00", "#c03352", "#54
 SPEEDS = ("#9bd93c", "#4ac16d", "#1fa287", "#26818e", "#355f8d")
 """Colours of a route from standing to its top speed, on every map: viridis without its ends, which
 vanish on white and on black paper."""
-MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-"""Markers of curves, in the order of `SERIES`."""
-
-WIDTH = 4.2
-"""Inches: a page makes a figure as wide as a phone, where 9 points must still be read."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # of curves, in the order of `SERIES`
+WIDTH = 4.2  # inches: a page makes a figure as wide as a phone, where 9 points must still be read
 
 _AROUND = np.array([(x, y) for x, y in itertools.product((1, -1, 0), repeat=2) if x or y])
 """The sides of a place on which a text may stand, from the first that is tried on."""
-
 _NEAR, _FAR, _CLEAR = 4.0, 16.0, 2.5
 """Points from a place to its text, at most to one that is not left out, and from a text to lines
 and other texts. Chosen: beside the map's widest line, of 5 points, texts stay clear."""
-
-_STEP = 4.0
-"""Pixels between two places of a line that no text is to cover: a text is 10 high."""
+_STEP = 4.0  # pixels between two places of a line that no text is to cover: a text is 10 high
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
@@ -115,17 +109,9 @@ def legend_above(axes: "Axes", columns: int = 4) -> None:
     handles, names = axes.get_legend_handles_labels()
     once = dict(zip(names, handles, strict=True))
     axes.legend(
-        once.values(),
-        once.keys(),
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.0,
-        borderpad=0.2,
-        ncols=columns,
-        columnspacing=0.9,
-        handlelength=1.3,
-        handletextpad=0.5,
-    )
+        once.values(), once.keys(), ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.0, borderpad=0.2, columnspacing=0.9, handlelength=1.3, handletextpad=0.5,
+    )  # fmt: skip
 
 
 def colour_bar(axes: "Axes", colours: "ScalarMappable", text: str, shrink: float) -> None:
@@ -201,12 +187,12 @@ def _drawn(axes: "Axes") -> Real:
     """Return places (n, 2), pixels, along all lines of a plot and at its marks."""
     from matplotlib.collections import LineCollection
 
-    marks = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
     ways = [line.get_xydata() for line in axes.lines if line.get_linestyle() != "None"]
     ways = [way for way in ways if np.size(way)]  # of a mere entry of the legend there is none
     for each in axes.collections:
         if isinstance(each, LineCollection):
             ways += each.get_segments()
+    marks = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
     places = [np.empty((0, 2)), *map(axes.transData.transform, marks)]
     for way in map(axes.transData.transform, ways):
         along = np.cumsum([0.0, *lengths(np.diff(way, axis=0))])

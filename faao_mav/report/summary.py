@@ -20,17 +20,10 @@ from faao_mav.validate.rule import by_rule, count_of, line_of
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result
 
-_AT_LIMIT = 0.999
-"""The share of a limit at which it counts as reached. Chosen."""
-
-_LOSS_TOLD = 0.01
-"""Share of R_avg that may be lost on the way before a plan for R_avg is warned about. Chosen."""
-
-_MOST_ZONES = 12
-"""Zones of a fence that are named; chosen to fit a few lines."""
-
-_LABEL_WIDTH = 13
-"""Characters that a label takes on the terminal."""
+_AT_LIMIT = 0.999  # the share of a limit at which it counts as reached. Chosen
+_LOSS_TOLD = 0.01  # share of R_avg that is lost before a plan for R_avg is warned about. Chosen
+_MOST_ZONES = 12  # zones of a fence that are named: a few lines. Chosen
+_LABEL_WIDTH = 13  # characters that a label takes on the terminal
 
 Line: TypeAlias = tuple[str, str]
 """A label and a text; a line without a label goes on where the one before it ended."""
@@ -58,11 +51,11 @@ def summary(
     among the files it says which rows a late aircraft takes.
     """
     lines: list[Line] = []
-    hidden = () if verbose else _RESEARCH
     topic = ""
     for label, text in result_lines(result):
         topic = label or topic
-        if topic not in hidden or (topic == "optimiser" and not result.solution.converged):
+        failed = topic == "optimiser" and not result.solution.converged
+        if verbose or failed or topic not in _RESEARCH:
             lines.append((label, text))
     lines += _checked(result)
     rows = f" (a late aircraft takes the row of the {taken_by(result.solution.plan)})"
