@@ -2,8 +2,8 @@
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,150 @@ if TYPE_CHECKING:
     from faao_mav.report.link import LinkReport
 
 
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """What flights have measured of a link."""
+
+    power: float | None = cli.option("DBM", "What was sent, dBm; without: shape only.")
+    noise: float | None = cli.option("DBM", "Noise of the receiver, dBm: for snr.")
+    rates: cli.File = cli.option(
+        "TABLE.csv", "The radio's rates, as a plan has them: for throughput."
+    )
+    unit: list[str] | None = cli.option("COLUMN=UNIT", "The unit of a column; may be repeated.")
+    calibrate: list[str] | None = cli.option(
+        "COUNT=DBM", "What a device counts at a level; once or twice."
+    )
+    mean: float = cli.option(
+        "S", "Time over which levels are averaged, s.", min=0.1, max=60.0, default=2.0
+    )
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of columns by their names."""
+        units = dict(each.partition("=")[::2] for each in self.unit or ())
+        for column, told in units.items():
+            if not told:
+                raise InputError(f"--unit {column}: expected COLUMN=UNIT, as in rssi=dbm")
+        return units
+
+    @property
+    def calibration(self) -> "Calibration":
+        """What a device counts, at which level."""
+        points = [
+            cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
+            for each in self.calibrate or ()
+        ]
+        if len(points) > 2 or len({count for count, *_ in points}) < len(points):
+            raise InputError("--calibrate: expected one or two different counts")
+        return points
+
+    def gains(self, path: Path, station: Sequence[float]) -> "Iterator[Samples]":
+        """Yield the gain, dB, in each flight of a table or log; without power within a constant."""
+        for samples, unit in self._flights(path, station):
+            if unit == "mbit/s":
+                samples, unit = self._by_rates(path, samples), "db"
+            if unit == "db" and (self.power is None) != (self.noise is None):
+                raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
+            floor = self.noise or 0.0 if unit == "db" else 0.0
+            yield replace(samples, level=samples.level + floor - (self.power or 0.0))
+
+    def _flights(self, path: Path, station: Sequence[float]) -> Iterator[tuple["Samples", str]]:
+        """Yield the flights in a table or log, and the unit of what was measured."""
+        import numpy as np
+
+        from faao_mav.fly.logs import read_log
+        from faao_mav.radio.measured import level_of, read_measured, samples_at
+
+        units, calibration = self.units, self.calibration
+        if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
+            found = read_measured(path, station, units, calibration)
+            if found.left_out:
+                cli.note(f"{path}: {found.left_out} rows without a number are left out")
+            yield found.samples, found.unit
+            return
+        told = [record for record in read_log(path) if np.isfinite(record.rssi).any()]
+        if not told:
+            raise InputError(f"{path}: no radio tells a level in it; expected RADIO_STATUS or RAD")
+        for record in told:
+            known = np.isfinite(record.rssi)
+            level, unit = level_of(path, record.rssi[known], units.get("rssi", "raw"), calibration)
+            t, up = record.t[known], (record.altitude - record.home)[known]
+            at = t, record.latitude[known], record.longitude[known], up
+            yield samples_at(path, station, at, level), unit
+
+    def _by_rates(self, path: Path, samples: "Samples") -> "Samples":
+        """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.
+
+        What is below the lowest rate or not below the highest may be of any SNR, and is left out.
+        """
+        import numpy as np
+
+        from faao_mav.plan.beside import MAX_CHARACTERS, read_rates
+        from faao_mav.radio.rate_steps import RateSteps
+
+        if (rates := self.rates) is None:
+            raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
+        columns = read_rates(read_text(rates, MAX_CHARACTERS, "a table", InputError), str(rates))
+        if "mbit_per_s" not in columns:
+            raise InputError(f"{rates}: no column mbit_per_s, which a throughput needs")
+        steps = RateSteps.of(columns["snr_db"], columns["mbit_per_s"])
+        told = np.where(samples.level < steps.most, samples.level, np.nan)
+        snr = np.interp(told, steps.rates, steps.snr_db, left=np.nan)
+        if lost := int(np.sum(~np.isfinite(snr))):
+            said = "rows at the least or the greatest rate tell no SNR and are left out"
+            cli.note(f"{path}: {lost} {said}")
+        return replace(samples, level=snr)
+
+
+@dataclass(frozen=True, slots=True)
+class _Terrain:
+    """Where no flight has measured a link: heights of the ground, and the map over them."""
+
+    terrain: list[Path] | None = cli.option(
+        "DEM", "No log: heights, .hgt or GeoTIFF; may be repeated. The map is beside --out."
+    )
+    frequency: float | None = cli.option("MHZ", "Over terrain: the frequency.")
+    clutter: float = cli.option(
+        "M", "Over terrain: the height of woods and houses.", min=0.0, max=200.0, default=0.0
+    )
+    heights: str = cli.option(
+        "M,M",
+        "Over terrain: heights of the map above the station's ground.",
+        default="40,60,80,100,120",
+    )
+    radius: float = cli.option(
+        "M", "Over terrain: how far the map goes.", min=10.0, max=50_000.0, default=1000.0
+    )
+    spacing: float = cli.option(
+        "M", "Over terrain: steps of the map.", min=1.0, max=1000.0, default=20.0
+    )
+
+    def report(self, station: Sequence[float]) -> "LinkReport":
+        """Return free space and the map of what terrain takes above it."""
+        frequency, heights, paths = self.frequency, self.heights, self.terrain or ()
+        if frequency is None or not 30 <= frequency <= 100_000:
+            raise InputError("--frequency: expected MHz, 30 to 100000, for --terrain")
+        wanted = f"--heights {heights}: expected metres that rise, as 40,60,80"
+        levels = cli.read_numbers(heights, heights.count(",") + 1, wanted)
+        if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= 20_000:
+            raise InputError(wanted)
+        from faao_mav.radio.terrain import read_terrain, terrain_map
+        from faao_mav.report.link import over_terrain
+
+        rasters = []
+        for path in paths:
+            raster, unknown = read_terrain(path)
+            rasters.append(raster)
+            if unknown:
+                said = "heights are not known and taken from the nearest that are"
+                cli.note(f"{path}: {unknown:,} {said}")
+        size = self.clutter, self.radius, self.spacing
+        with cli.progress() as observe:
+            found = terrain_map(rasters, station, 1e6 * frequency, levels, *size, observe)
+        return over_terrain(found, frequency, ", ".join(path.name for path in paths))
+
+
+@cli.with_options(measured=_Measured, over=_Terrain)
 def link(
     station: str = cli.option(
         "LAT,LON,HEIGHT",
@@ -29,41 +173,14 @@ def link(
         None, metavar="[LOG...]", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
     ),
     out: cli.File = cli.option("LINK.yaml", "What to write: a plan's radio.gain."),
-    power: float | None = cli.option("DBM", "What was sent, dBm; without: shape only."),
-    noise: float | None = cli.option("DBM", "Noise of the receiver, dBm: for snr."),
-    rates: cli.File = cli.option(
-        "TABLE.csv", "The radio's rates, as a plan has them: for throughput."
-    ),
-    unit: list[str] | None = cli.option("COLUMN=UNIT", "The unit of a column; may be repeated."),
-    calibrate: list[str] | None = cli.option(
-        "COUNT=DBM", "What a device counts at a level; once or twice."
-    ),
-    mean: float = cli.option(
-        "S", "Time over which levels are averaged, s.", min=0.1, max=60.0, default=2.0
-    ),
     map_file: cli.File = cli.option(
         "MAP.npz", "What the law leaves of the logs, as a map above it.", "--map"
     ),
-    terrain: list[Path] | None = cli.option(
-        "DEM", "No log: heights, .hgt or GeoTIFF; may be repeated. The map is beside --out."
-    ),
-    frequency: float | None = cli.option("MHZ", "Over terrain: the frequency."),
-    clutter: float = cli.option(
-        "M", "Over terrain: the height of woods and houses.", min=0.0, max=200.0, default=0.0
-    ),
-    heights: str = cli.option(
-        "M,M",
-        "Over terrain: heights of the map above the station's ground.",
-        default="40,60,80,100,120",
-    ),
-    radius: float = cli.option(
-        "M", "Over terrain: how far the map goes.", min=10.0, max=50_000.0, default=1000.0
-    ),
-    spacing: float = cli.option(
-        "M", "Over terrain: steps of the map.", min=1.0, max=1000.0, default=20.0
-    ),
     report: cli.File = cli.option("PAGE.html", "Measured against fitted, on one page."),
     as_json: bool = cli.AS_JSON,
+    *,
+    measured: _Measured,
+    over: _Terrain,
 ) -> None:
     """Fit the law of a link's path gain to what was measured in flight, or to terrain.
 
@@ -79,52 +196,37 @@ def link(
     Exit status: 0 fitted; 1 no law holds, nothing is written but the page; 2 unusable arguments or
     input.
     """
-    from faao_mav.radio.map_file import map_archive
-    from faao_mav.report.summary import joined
-
     wanted = f"--station {station}: expected LAT,LON,HEIGHT, degrees and m"
     place = cli.read_numbers(station, 3, wanted)
     if abs(place[0]) > 90 or abs(place[1]) > 180:
         raise InputError(wanted)
-    units = dict(each.partition("=")[::2] for each in unit or ())
-    for column, told in units.items():
-        if not told:
-            raise InputError(f"--unit {column}: expected COLUMN=UNIT, as in rssi=dbm")
-    points = [
-        cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
-        for each in calibrate or ()
-    ]
-    if len(points) > 2 or len({count for count, *_ in points}) < len(points):
-        raise InputError("--calibrate: expected one or two different counts")
     if out is not None:
         check_ending(out, "--out", (".yaml", ".yml"))
-        map_file = map_file or (out.with_suffix(".npz") if terrain else None)
+        map_file = map_file or (out.with_suffix(".npz") if over.terrain else None)
     if map_file is not None:
         check_ending(map_file, "--map", (".npz",))
         if out is None:
             raise InputError("--map: give --out, the file that names it")
     inputs = {f"LOG {path}": path for path in logs or ()}
-    inputs |= {f"--terrain {path}": path for path in terrain or ()}
+    inputs |= {f"--terrain {path}": path for path in over.terrain or ()}
     outputs = {"--out": out, "--map": map_file, "--report": report}
-    cli.check_outputs(outputs, {"--rates": rates, **inputs})
-    if bool(logs) == bool(terrain):
+    cli.check_outputs(outputs, {"--rates": measured.rates, **inputs})
+    if bool(logs) == bool(over.terrain):
         raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
-    written: list[Path] = []
-    if terrain:
-        if report is not None:
-            raise InputError("--report: is about logs; leave it out with --terrain")
-        found = _over_terrain(terrain, place, frequency, heights, (clutter, radius, spacing))
-    else:
-        from faao_mav.radio.fit import fit_link
-        from faao_mav.report.link import fitted, link_page
+    if over.terrain and report is not None:
+        raise InputError("--report: is about logs; leave it out with --terrain")
+    from faao_mav.radio.fit import fit_link
+    from faao_mav.radio.map_file import map_archive
+    from faao_mav.report.link import fitted, link_page
+    from faao_mav.report.summary import joined
 
-        flights = [
-            each
-            for path in logs or ()
-            for each in _gains(path, place, units, points, rates, power, noise)
-        ]
-        fit = fit_link(flights, mean)
-        found = fitted(fit, power is not None, place if map_file is not None else None)
+    written: list[Path] = []
+    if over.terrain:
+        found = over.report(place)
+    else:
+        flights = [each for path in logs or () for each in measured.gains(path, place)]
+        fit = fit_link(flights, measured.mean)
+        found = fitted(fit, measured.power is not None, place if map_file is not None else None)
         if report is not None:
             write_whole(report, link_page(fit, found).encode())
             written.append(report)
@@ -142,104 +244,3 @@ def link(
         as_json=as_json,
         good=bool(found.law),
     )
-
-
-def _over_terrain(
-    paths: Sequence[Path],
-    station: Sequence[float],
-    frequency: float | None,
-    heights: str,
-    size: tuple[float, float, float],
-) -> "LinkReport":
-    """Return free space and the map of what terrain takes above it; `size` as `terrain_map`."""
-    if frequency is None or not 30 <= frequency <= 100_000:
-        raise InputError("--frequency: expected MHz, 30 to 100000, for --terrain")
-    wanted = f"--heights {heights}: expected metres that rise, as 40,60,80"
-    levels = cli.read_numbers(heights, heights.count(",") + 1, wanted)
-    if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= 20_000:
-        raise InputError(wanted)
-    from faao_mav.radio.terrain import read_terrain, terrain_map
-    from faao_mav.report.link import over_terrain
-
-    rasters = []
-    for path in paths:
-        raster, unknown = read_terrain(path)
-        rasters.append(raster)
-        if unknown:
-            cli.note(
-                f"{path}: {unknown:,} heights are not known and taken from the nearest that are"
-            )
-    with cli.progress() as observe:
-        found = terrain_map(rasters, station, 1e6 * frequency, levels, *size, observe)
-    return over_terrain(found, frequency, ", ".join(path.name for path in paths))
-
-
-def _gains(
-    path: Path,
-    station: Sequence[float],
-    units: Mapping[str, str],
-    calibration: "Calibration",
-    rates: Path | None,
-    power: float | None,
-    noise: float | None,
-) -> "Iterator[Samples]":
-    """Yield the gain, dB, in each flight of a table or log; without a `power` within a constant."""
-    for samples, unit in _flights(path, station, units, calibration):
-        if unit == "mbit/s":
-            samples, unit = _by_rates(path, samples, rates), "db"
-        if unit == "db" and (power is None) != (noise is None):
-            raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
-        floor = noise or 0.0 if unit == "db" else 0.0
-        yield replace(samples, level=samples.level + floor - (power or 0.0))
-
-
-def _flights(
-    path: Path, station: Sequence[float], units: Mapping[str, str], calibration: "Calibration"
-) -> Iterator[tuple["Samples", str]]:
-    """Yield the flights in a table or log, and the unit of what was measured."""
-    import numpy as np
-
-    from faao_mav.radio.measured import level_of, read_measured, samples_at
-
-    if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
-        found = read_measured(path, station, units, calibration)
-        if found.left_out:
-            cli.note(f"{path}: {found.left_out} rows without a number are left out")
-        yield found.samples, found.unit
-        return
-    from faao_mav.fly.logs import read_log
-
-    told = [record for record in read_log(path) if np.isfinite(record.rssi).any()]
-    if not told:
-        raise InputError(f"{path}: no radio tells a level in it; expected RADIO_STATUS or RAD")
-    for record in told:
-        known = np.isfinite(record.rssi)
-        level, unit = level_of(path, record.rssi[known], units.get("rssi", "raw"), calibration)
-        t, up = record.t[known], (record.altitude - record.home)[known]
-        at = t, record.latitude[known], record.longitude[known], up
-        yield samples_at(path, station, at, level), unit
-
-
-def _by_rates(path: Path, samples: "Samples", rates: Path | None) -> "Samples":
-    """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.
-
-    What is below the lowest rate or not below the highest may be of any SNR, and is left out.
-    """
-    import numpy as np
-
-    from faao_mav.plan.beside import MAX_CHARACTERS, read_rates
-    from faao_mav.radio.rate_steps import RateSteps
-
-    if rates is None:
-        raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
-    columns = read_rates(read_text(rates, MAX_CHARACTERS, "a table", InputError), str(rates))
-    if "mbit_per_s" not in columns:
-        raise InputError(f"{rates}: no column mbit_per_s, which a throughput needs")
-    steps = RateSteps.of(columns["snr_db"], columns["mbit_per_s"])
-    told = np.where(samples.level < steps.most, samples.level, np.nan)
-    snr = np.interp(told, steps.rates, steps.snr_db, left=np.nan)
-    if lost := int(np.sum(~np.isfinite(snr))):
-        cli.note(
-            f"{path}: {lost} rows at the least or the greatest rate tell no SNR and are left out"
-        )
-    return replace(samples, level=snr)

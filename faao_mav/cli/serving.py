@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from faao_mav.sim import MockAutopilot
+    from faao_mav.sim.faults import Faults
 
 _EMPTY = """\
 name: new relay
@@ -68,6 +69,22 @@ def app(
     serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=cli.note)
 
 
+def _faults(
+    drop: float = cli.option("P", "Lose packets, both ways.", min=0, max=1, default=0.0),
+    duplicate: float = cli.option("P", "Repeat packets.", min=0, max=1, default=0.0),
+    corrupt: float = cli.option("P", "Damage packets.", min=0, max=1, default=0.0),
+    delay: float = cli.option(
+        "S", "Delay every other packet by up to S seconds.", min=0, default=0.0
+    ),
+    seed: int = cli.option("N", "Of what the link does.", default=0),
+) -> "Faults":
+    from faao_mav.sim.faults import Faults
+
+    odd = 0.5 if delay else 0.0
+    return Faults(drop, duplicate, corrupt, reordering=odd, delay=delay, latency=0.0, seed=seed)
+
+
+@cli.with_options(faults=_faults)
 def autopilot(
     listen: str = cli.option(
         "CONNECTION",
@@ -91,14 +108,9 @@ def autopilot(
     wind: str | None = cli.option("SPEED,FROM", "The wind that it flies in, m/s and degrees."),
     speedup: float = cli.option("X", "Fly X times as fast as predicted.", min=0.01, default=1.0),
     boot: float = cli.option("S", "Boot for S seconds.", min=0, default=0.0),
-    drop: float = cli.option("P", "Lose packets, both ways.", min=0, max=1, default=0.0),
-    duplicate: float = cli.option("P", "Repeat packets.", min=0, max=1, default=0.0),
-    corrupt: float = cli.option("P", "Damage packets.", min=0, max=1, default=0.0),
-    delay: float = cli.option(
-        "S", "Delay every other packet by up to S seconds.", min=0, default=0.0
-    ),
-    seed: int = cli.option("N", "Of what the link does.", default=0),
     signing_key: cli.File = cli.SIGNING_KEY,
+    *,
+    faults: "Faults",
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
 
@@ -111,7 +123,7 @@ def autopilot(
     from faao_mav.mission.formats.parameter_file import read_parameters
     from faao_mav.mission.item import Home
     from faao_mav.sim import MockAutopilot, behaviour_of
-    from faao_mav.sim.faults import Faults, serve
+    from faao_mav.sim.faults import serve
     from faao_mav.wire.protocol import Address
     from faao_mav.wire.signing import read_signing
     from faao_mav.wire.transport import open_transport
@@ -134,15 +146,6 @@ def autopilot(
         parameters=values,
         speedup=speedup,
         boot=boot,
-    )
-    faults = Faults(
-        loss=drop,
-        duplication=duplicate,
-        corruption=corrupt,
-        reordering=0.5 if delay else 0.0,
-        delay=delay,
-        latency=0.0,
-        seed=seed,
     )
     key = None if signing_key is None else read_signing(signing_key).key
     transport = open_transport(listen)

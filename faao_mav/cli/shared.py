@@ -67,38 +67,47 @@ def exit_status() -> Iterator[None]:
         raise typer.Exit(2 if isinstance(error, InputError) else 1) from None
 
 
-def with_link(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a `command` the options of a link to a vehicle, which it takes as `link`.
+def with_options(**groups: Callable[..., Any]) -> Callable[..., Callable[..., None]]:
+    """Give a command more options, and each of `groups` made of its own as one argument.
 
-    They are `LinkOptions` by their names, and its `note` prints.
+    They are the parameters of a group, which is a function, or the fields of one, a dataclass.
     """
+    theirs = {name: signature(group).parameters for name, group in groups.items()}
 
-    def options(
-        system: int | None = SYSTEM,
-        component: int | None = option("N", "The autopilot's component number.", min=1, max=255),
-        own_system: int | None = option(
-            "N", "The system number to speak as; without: 246.", min=1, max=255
-        ),
-        log: File = option("F.tlog", "Write a log of the exchange."),
-        wait: float = option(
-            "S", "How long to wait for the vehicle, s.", "--timeout", min=0.1, default=10.0
-        ),
-        signing_key: File = SIGNING_KEY,
-    ) -> dict[str, Any]:
-        return locals() | {"note": note}
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def run(**given: Any) -> None:
+            for name, options in theirs.items():
+                given[name] = groups[name](**{option: given.pop(option) for option in options})
+            command(**given)
 
-    own, shared = signature(command).parameters, signature(options).parameters
+        own = signature(command).parameters.values()
+        parameters = [each for each in own if each.name not in groups]
+        parameters += [each for options in theirs.values() for each in options.values()]
+        vars(run)["__signature__"] = signature(command).replace(parameters=parameters)
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        return run
 
-    @wraps(command)
-    def run(**given: Any) -> None:
-        link = options(**{name: given.pop(name) for name in shared})
-        command(**given, link=link)
+    return decorate
 
-    taken = [each for each in own.values() if each.name != "link"]
-    parameters = [*taken, *shared.values()]
-    vars(run)["__signature__"] = signature(command).replace(parameters=parameters)
-    run.__annotations__ = {each.name: each.annotation for each in parameters}
-    return run
+
+def _link(
+    system: int | None = SYSTEM,
+    component: int | None = option("N", "The autopilot's component number.", min=1, max=255),
+    own_system: int | None = option(
+        "N", "The system number to speak as; without: 246.", min=1, max=255
+    ),
+    log: File = option("F.tlog", "Write a log of the exchange."),
+    wait: float = option(
+        "S", "How long to wait for the vehicle, s.", "--timeout", min=0.1, default=10.0
+    ),
+    signing_key: File = SIGNING_KEY,
+) -> dict[str, Any]:
+    return locals() | {"note": note}
+
+
+with_link = with_options(link=_link)
+"""Gives a command the options of a link to a vehicle: `LinkOptions` whose `note` prints."""
 
 
 def check_known(autopilot: str | None, kind: str | None) -> None:

@@ -82,21 +82,15 @@ class Served:
         page = self.context.new_page()
         page.set_default_timeout(WAIT)
         page.set_viewport_size({"width": width, "height": 800})
-        page.on("pageerror", lambda error: self.troubles.append(f"error: {error}"))
-        page.on("console", lambda said: self._said(said.type, said.text))
-        page.on("request", lambda request: self._requested(request.url))
+        local = (self.address.partition("?")[0], "data:", "blob:")
+        trouble = self.troubles.append
+        page.on("pageerror", lambda error: trouble(str(error)))
+        odd = ("error", "warning")
+        page.on("console", lambda said: trouble(said.text) if said.type in odd else None)
+        page.on("request", lambda r: None if r.url.startswith(local) else trouble(r.url))
         page.goto(self.address)
         finished(page)
         return page
-
-    def _said(self, kind: str, text: str) -> None:
-        if kind in ("error", "warning"):
-            self.troubles.append(f"console: {text}")
-
-    def _requested(self, url: str) -> None:
-        here = self.address.partition("?")[0]
-        if not url.startswith((here, "data:", "blob:")):
-            self.troubles.append(f"request: {url}")
 
 
 @contextmanager
@@ -183,6 +177,12 @@ def drag(page: "Page", title: str, east: float, north: float) -> None:
     for k in range(1, 6):
         page.mouse.move(x + k * east / 5, y - k * north / 5)
     page.mouse.up()
+
+
+def enter(page: "Page", label: str, value: str) -> None:
+    box = page.get_by_label(label)
+    box.fill(value)
+    box.press("Enter")
 
 
 def saved(page: "Page", served: Served) -> str:
@@ -281,22 +281,18 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
     window.locator(".facts dt").first.wait_for()
     window.get_by_role("tab", name="Plan").click()
     window.get_by_text("vehicle", exact=True).click()
-    entry = window.locator('[data-key="vehicle.max_speed"]')
-    box = window.get_by_label("max_speed, m/s")
-    box.fill("-1")
-    box.press("Enter")
+    enter(window, "max_speed, m/s", "-1")
     window.locator(".state[data-state=refused]").wait_for()
     with pytest.raises(PlanError) as error:
         parse_plan(PLAN.replace("max_speed: 10", "max_speed: -1"), "plan.yaml")
     said = str(error.value).removeprefix("plan.yaml: vehicle.max_speed: ")
     assert said in window.locator(".q-field--error").inner_text()
-    assert entry.count() == 1
+    assert window.locator('[data-key="vehicle.max_speed"]').count() == 1
     # what was found for the plan before is not shown as if it were of this one
     assert window.evaluate(CURVES) == []
     assert window.locator(".facts dt").count() == 0
     assert window.locator(".command").is_hidden()
-    box.fill("9.9")
-    box.press("Enter")
+    enter(window, "max_speed, m/s", "9.9")
     finished(window)
     assert window.locator(".q-field--error").count() == 0
     hops = [["base station to UAV", "#3b7ddd"], ["UAV to user", "#d9731a"]]
@@ -340,23 +336,19 @@ def test_what_is_uploaded_and_watched_flies_by_the_command_that_is_shown(
 def test_the_server_ends_in_seconds_in_the_middle_of_its_work(
     served: Served, tmp_path: Path
 ) -> None:
-    (tmp_path / "plan.yaml").write_text(PLAN)
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(PLAN)
     with (
         vehicle(faults=Faults(loss=0.2, rate=300)) as (connection, _),
-        server(tmp_path, "plan.yaml", end=signal.SIGINT) as address,
+        server(tmp_path, plan, end=signal.SIGINT) as address,
     ):
-        page = served.context.new_page()
-        page.set_default_timeout(WAIT)
-        page.goto(address)
-        finished(page)
+        page = Served(plan, address, served.context).window()
         page.get_by_role("tab", name="Fly").click()
         page.get_by_label("Connection").fill(connection)
         page.get_by_role("button", name="Upload and verify").click()
         page.locator(".stands", has_text="mission").wait_for()
         page.get_by_role("tab", name="Plan").click()
-        box = page.get_by_label("duration, s")
-        box.fill("60")
-        box.press("Enter")
+        enter(page, "duration, s", "60")
         page.locator(".state[data-state=computing]").wait_for()
     page.close()
 
@@ -365,10 +357,9 @@ def test_zones_of_a_file_are_red_or_green_and_the_key_says_so(
     window: "Page", served: Served
 ) -> None:
     rings = [(-300, -300), (400, -300), (400, 400), (-300, 400)], [(90, 90), (120, 90), (90, 120)]
-    frame = LocalFrame(-35.363262, 149.165237)
-    areas = [np.stack(frame.to_geodetic(ring), axis=1).tolist() for ring in rings]
-    polygons = (Polygon((*map(tuple, area),), inclusion=not k) for k, area in enumerate(areas))
-    fence = Fence(tuple(polygons))
+    frame = LocalFrame(HOME.latitude, HOME.longitude)
+    areas = [zip(*frame.to_geodetic(ring), strict=True) for ring in rings]
+    fence = Fence(tuple(Polygon((*area,), inclusion=not k) for k, area in enumerate(areas)))
     write_mission(Mission((), HOME, fence), served.plan.with_name("site.plan"))
     text = PLAN + "fence: {file: site.plan, exclusion: [{center: [-100, 80], radius: 20}]}\n"
     served.plan.write_text(text)

@@ -94,11 +94,6 @@ def test_a_long_job_ends_with_its_wait_and_its_death_is_told() -> None:
     asyncio.run(run())
 
 
-def test_answers_are_errors_where_a_plan_is_none() -> None:
-    assert "site" in answers.rough("name: x\n", "p", None).refused
-    assert "site" in answers.finished("name: x\n", "p").refused
-
-
 def test_with_a_spread_the_finished_chart_of_what_is_delivered_tells_what_arrives() -> None:
     text = edited(FLYABLE, {"radio.causal": True, "radio.gain.spread_db": 6.0})
     found = answers.finished(text, "p")
