@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,32 +13,79 @@ from faao_mav.errors import InputError, PlanError
 
 if TYPE_CHECKING:
     from faao_mav.plan import Plan
-    from faao_mav.study import StudyRow
+    from faao_mav.study import StudyCase, StudyRow
 
-_INTERRUPTED = 130
-"""The exit status of an interrupted study, as a shell reports SIGINT: 128 + 2."""
+_INTERRUPTED = 130  # the exit status of an interrupted study, as a shell reports SIGINT: 128 + 2
 
 
-def study(
-    plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What is varied."""
+
     vary: list[str] | None = cli.option(
         "KEY=VALUES", "start:stop:step or a,b,c; several make a grid."
-    ),
-    power: str | None = cli.option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c."),
-    schemes: str | None = cli.option(
-        "S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian."
-    ),
-    seeds: int | None = cli.option("N", "Draws of the fading, from radio.seed.", min=1),
+    )
+    power: str | None = cli.option("VALUES", "Both powers, dBm: -40:0:5 or a,b,c.")
+    schemes: str | None = cli.option("S,S", "Of faao,algorithm1,mmse,mrt,zf,waterfilling,gaussian.")
+    seeds: int | None = cli.option("N", "Draws of the fading, from radio.seed.", min=1)
     frontier: str | None = cli.option(
         "AXIS,data", "The most data for every AXIS: duration, power or energy."
-    ),
-    points: int | None = cli.option("N", "Points of the frontier; without it 12.", min=2),
+    )
+    points: int | None = cli.option("N", "Points of the frontier; without it 12.", min=2)
+
+    def cases(self, plan: "Plan") -> "tuple[Sequence[StudyCase], str | None]":
+        """Return the cases of a plan, and the key that a frontier varies, None for any other study.
+
+        Raises `PlanError` for values that no case can use; some may fail and become rows.
+        """
+        from faao_mav.plan import parse_plan
+        from faao_mav.plan.keys import POWER
+        from faao_mav.plan.sections import Study
+        from faao_mav.study import make_cases, parse_vary
+        from faao_mav.study.frontier import POINTS, frontier_cases, parse_frontier
+        from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
+
+        options = [parse_vary(text) for text in self.vary or []]
+        if self.power is not None:
+            options.append((POWER, parse_values(self.power, "--power")))
+        grid, along, asked = join_grid(options), None, plan.study or Study()
+        if self.frontier is not None:
+            if grid or self.schemes is not None or self.seeds is not None:
+                raise InputError("--frontier: leave --vary, --power, --schemes and --seeds out")
+            along = parse_frontier(self.frontier)
+            cases = frontier_cases(plan, along, self.points or POINTS)
+        elif self.points is not None:
+            raise InputError(f"--points {self.points}: is for a frontier; give --frontier too")
+        else:
+            cases = make_cases(
+                plan.text,
+                vary=grid or asked.vary,
+                schemes=asked.schemes if self.schemes is None else parse_schemes(self.schemes),
+                seeds=self.seeds or asked.seeds,
+                source=plan.source,
+            )
+        refused = []
+        for case in cases:
+            try:
+                parse_plan(case.text, case.source)
+            except PlanError as error:
+                refused.append(error)
+            else:
+                return cases, along
+        raise refused[0]
+
+
+@cli.with_options(asked=_Asked)
+def study(
+    plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
     jobs: int = cli.option("N", "Processes; -1: one a core.", default=-1),
     cluster: str | None = cli.option(
         "ADDRESS", "A Dask scheduler, tcp://host:port, not processes."
     ),
     out: cli.File = cli.option("DIR", "Keep rows there as they finish; go on where it ended."),
     as_json: bool = cli.AS_JSON,
+    *,
+    asked: _Asked,
 ) -> None:
     """Optimise a plan with many values, schemes and seeds, and compare.
 
@@ -46,48 +94,15 @@ def study(
 
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
-    from faao_mav.plan import parse_plan, read_plan
-    from faao_mav.plan.keys import POWER
-    from faao_mav.plan.sections import Study
-    from faao_mav.study import make_cases, parse_vary, run_study
-    from faao_mav.study.frontier import POINTS, frontier_cases, frontier_table, parse_frontier
+    from faao_mav.plan import read_plan
+    from faao_mav.study import run_study
+    from faao_mav.study.frontier import frontier_table
     from faao_mav.study.rows import as_dict, comparison
-    from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
 
     if jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for one a core")
     plan = read_plan(plan_file)
-    asked = plan.study or Study()
-    options = [parse_vary(text) for text in vary or []]
-    if power is not None:
-        options.append((POWER, parse_values(power, "--power")))
-    grid = join_grid(options)
-    along = None
-    if frontier is not None:
-        if grid or schemes is not None or seeds is not None:
-            raise InputError("--frontier: leave --vary, --power, --schemes and --seeds out")
-        along = parse_frontier(frontier)
-        cases = frontier_cases(plan, along, points or POINTS)
-    elif points is not None:
-        raise InputError(f"--points {points}: is for a frontier; give --frontier too")
-    else:
-        cases = make_cases(
-            plan.text,
-            vary=grid or asked.vary,
-            schemes=parse_schemes(schemes) if schemes is not None else asked.schemes,
-            seeds=seeds or asked.seeds,
-            source=str(plan_file),
-        )
-    refused = []
-    for case in cases:  # values that no case can use are refused; some may fail and become rows
-        try:
-            parse_plan(case.text, case.source)
-        except PlanError as error:
-            refused.append(error)
-        else:
-            break
-    else:
-        raise refused[0]
+    cases, along = asked.cases(plan)
     try:
         with cli.progress() as draw:
             done = itertools.count(1)
@@ -113,10 +128,7 @@ def study(
 
 
 def _draw(rows: "Sequence[StudyRow]", plan: "Plan", along: str | None, out: Path) -> list[Path]:
-    """Add the figure to what the study has written, where there is something to draw.
-
-    `along` is the key that a frontier varies, None for any other study.
-    """
+    """Add the figure to what the study has written, where there is something to draw."""
     from faao_mav.plan.sections import Study
     from faao_mav.report.style import save_figure
     from faao_mav.study.figure import can_draw, study_figure
