@@ -248,16 +248,6 @@ def test_a_plan_beyond_its_vehicle_gets_a_mission_by_force_alone(
     assert re.search(r"^mission      none: .*max_speed: 60 m/s; the plane flies", told.stdout, re.M)
 
 
-def test_what_only_the_simulators_airframe_cannot_fly_is_a_note(plan: Path, out: Path) -> None:
-    plan.write_text(edited(GENTLE, {"flight.duration": 30}))
-    assert "assumes the simulator's airframe (vehicle.body: sitl)" in run(plan).stdout
-    plan.write_text(edited(GENTLE, {"flight.duration": 30, "vehicle.body.linear_drag": 0.9}))
-    told = record(plan, "--out", out)
-    assert told["predicted"]["assumption"] == "assumes the airframe of vehicle.body"
-    assert [e["level"] for e in told["validation"] if e["rule"] == "speed-lean"] == ["note"]
-    assert {e["level"] for e in told["validation"]} <= {"note", "warning"}
-
-
 def test_an_upload_that_fails_or_is_refused_leaves_the_files(plan: Path, out: Path) -> None:
     with vehicle(refusals={(0, 2): MavResult.UNSUPPORTED}) as (to, _):
         result, told = (run(plan, "--out", out, "--upload", to, *end) for end in ((), ("--json",)))
