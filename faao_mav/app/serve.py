@@ -48,7 +48,6 @@ _OPEN_STREET_MAP: dict[str, Any] = {
 }
 """A background map: where its tiles are, who made it, and up to which zoom it has any."""
 
-
 _HEADERS = {
     # Vue compiles templates and NiceGUI's scripts are inline; only tiles come from elsewhere
     "content-security-policy": (
@@ -133,8 +132,7 @@ class TileFile:
             ((most,),) = self._rows("SELECT MAX(zoom_level) FROM tiles")
         except (sqlite3.Error, TypeError, ValueError) as error:
             raise InputError(f"--mbtiles {path}: not an MBTiles file: {error}") from None
-        kind = str(told.get("format"))
-        if kind not in _IMAGES:
+        if (kind := str(told.get("format"))) not in _IMAGES:
             known = ", ".join(_IMAGES)
             raise InputError(f"--mbtiles {path}: tiles of format {kind}; expected one of {known}")
         if not isinstance(most, int) or most < 0:
@@ -160,9 +158,8 @@ class TileFile:
 
     def _rows(self, asked: str, values: tuple[int, ...] = ()) -> list[Any]:
         # a connection each: they are asked for by several threads
-        with contextlib.closing(
-            sqlite3.connect(f"{self._path.resolve().as_uri()}?mode=ro", uri=True)
-        ) as data:
+        address = f"{self._path.resolve().as_uri()}?mode=ro"
+        with contextlib.closing(sqlite3.connect(address, uri=True)) as data:
             return data.execute(asked, values).fetchall()
 
 
@@ -199,9 +196,7 @@ def serve(
         @inner.get("/tiles/{zoom}/{x}/{y}")
         def tile(zoom: int, x: int, y: int) -> Response:
             found = tiles.tile(zoom, x, y)
-            if found is None:
-                return Response(status_code=204)
-            return Response(found, media_type=tiles.media_type)
+            return Response(found, 204 if found is None else 200, media_type=tiles.media_type)
 
     ui.run_with(
         inner,

@@ -184,13 +184,11 @@ def fly(
     from faao_mav.validate import predicted
     from faao_mav.workflow import debriefing_as_dict
 
-    begun = False
+    header = [] if as_json else [HEADER]
 
     def say(told: dict[str, Any]) -> None:
-        nonlocal begun
-        if not as_json and not begun and "note" not in told:
-            begun = True
-            typer.echo(HEADER)
+        if header and "note" not in told:
+            typer.echo(header.pop())
         typer.echo(json.dumps(cli.plain(told)) if as_json else as_text(told))
 
     if stream and not arm:
@@ -204,19 +202,17 @@ def fly(
     plan = solution.plan if solution is not None else None
     vehicle, _ = choose_vehicle(mission_file, file, plan)
     whose = made_for(mission_file, file, plan.aircraft if plan is not None else None)
-    flight = Flight(file.mission, vehicle, whose, solution, stream)
     track = None
     if not stream:
-        wind = plan.wind if plan is not None else (0.0, 0.0)
+        rate, wind = POSITION_RATE, plan.wind if plan is not None else (0.0, 0.0)
         track, reason = predicted(file.mission, vehicle, wind)
         if track is None:
             cli.note(f"the flight is not predicted: {reason}")
     telling = Telling(solution, track, radios, say)
-    rate = rate if stream else POSITION_RATE
     if radios is not None and plan is not None:  # two positions for each slot at least
         rate = max(rate, 2 / plan.flight.time_step)
     report = fly_mission(
-        flight,
+        Flight(file.mission, vehicle, whose, solution, stream),
         to,
         arm=arm,
         lands=track is None or track.lands,

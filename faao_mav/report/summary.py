@@ -223,8 +223,8 @@ def _mission(result: Result) -> Iterator[Line]:
 
 def _goal(solution: Solution) -> Iterator[Line]:
     """Yield what a goal led to, and for a least quantity what one step less would deliver."""
-    found, plan = solution.least, solution.plan
-    if found is None:
+    plan = solution.plan
+    if (found := solution.least) is None:
         return
     flights = f"{found.optimizations} flights optimised"
     if plan.goal.energy_wh is not None:

@@ -26,38 +26,35 @@ def test_a_change_leaves_comments_and_all_other_values() -> None:
         wanted = load_yaml(text, "p")
         wanted["flight"]["altitude"] = 77.5
         assert load_yaml(document.text, "p") == wanted, path
-    text = (MISSIONS / "fenced_relay.yaml").read_text()
-    document = Document(text)
-    document.write(("flight", "altitude"), "77.5")
-    assert document.text == text.replace("altitude: 100", "altitude: 77.5")
+        if path.stem == "fenced_relay":
+            assert document.text == text.replace("altitude: 100", "altitude: 77.5")
 
 
 def test_values_are_written_removed_undone_and_done_again() -> None:
-    document = Document("# top\nflight: {duration: 120}  # s\n")
+    top, start = "# top\nflight: {duration: 120}  # s\n", ("flight", "start")
+    document = Document(top)
     document.write(("optimizer", "tolerance"), "1e-3")
-    document.write(("flight", "start"), "[0, 350]")
+    document.write(start, "[0, 350]")
     assert document.text == (
         "# top\nflight: {duration: 120, start: [0, 350]} # s\noptimizer:\n  tolerance: 1e-3\n"
     )
-    assert document.shown(("flight", "start")) == "[0, 350]"
     document.write(("flight", "duration"), " ")
     assert document.value(("flight", "duration")) is None
     document.undo()
     document.undo()
-    assert document.shown(("flight", "start")) == ""
-    assert (document.can_undo, document.can_redo) == (True, True)
+    assert (document.shown(start), document.can_undo, document.can_redo) == ("", True, True)
     document.redo()
-    assert document.shown(("flight", "start")) == "[0, 350]"
+    assert document.shown(start) == "[0, 350]"
     document.write(("name",), "x")
     assert not document.can_redo
     for _ in range(9):
         document.undo()
-    assert document.text == "# top\nflight: {duration: 120}  # s\n"
+    assert document.text == top
     for k in range(5):
-        document.put(("flight", "start"), [k, 50], "drag 1")
-    document.put(("flight", "start"), [9, 50], "drag 2")
+        document.put(start, [k, 50], "drag 1")
+    document.put(start, [9, 50], "drag 2")
     document.undo()
-    assert document.value(("flight", "start")) == [4, 50]  # a whole drag is one step
+    assert document.value(start) == [4, 50]  # a whole drag is one step
 
 
 def test_what_plans_do_not_hold_is_kept_as_text_and_told_as_the_command_line_does() -> None:
@@ -175,8 +172,7 @@ def test_only_the_file_that_was_opened_is_saved_and_no_newer_one(tmp_path: Path)
         document.write(("name",), name)
         assert not document.saved
     first.save()
-    assert first.saved
-    assert path.read_text() == first.text
+    assert (first.saved, path.read_text()) == (True, first.text)
     with pytest.raises(PlanError, match="was changed since"):
         second.save()
     first.replace("name: other\n", "other.yaml")

@@ -37,11 +37,6 @@ def lines(axes: Any) -> dict[str, Any]:
     return {line.get_label(): line for line in axes.lines}
 
 
-def drawn(text: Any) -> Any:
-    """The place of a text on the figure, pixels."""
-    return text.get_window_extent()
-
-
 def test_axes_are_named_with_units_and_legends_hide_no_curve() -> None:
     for figure in every():
         figure.draw_without_rendering()
@@ -57,7 +52,7 @@ def test_axes_are_named_with_units_and_legends_hide_no_curve() -> None:
             )  # fmt: skip
             assert bool(axes.get_xlabel()) == lowest
             if (legend := axes.get_legend()) is not None:
-                assert drawn(legend).y0 >= axes.get_window_extent().y1 - 0.5
+                assert legend.get_window_extent().y0 >= axes.get_window_extent().y1 - 0.5
 
 
 def test_the_curves_are_the_flight() -> None:
@@ -146,7 +141,7 @@ def test_what_is_written_on_a_map_covers_nothing() -> None:
     ):
         figure.draw_without_rendering()
         plot = figure.axes[0]
-        edge, boxes = plot.get_window_extent(), [drawn(text) for text in plot.texts]
+        edge, boxes = plot.get_window_extent(), [text.get_window_extent() for text in plot.texts]
         assert len(boxes) > 4
         lines = [plot.transData.transform(line.get_xydata()) for line in plot.lines]
         route = plot.transData.transform(found.solution.w)
