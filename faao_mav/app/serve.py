@@ -229,7 +229,8 @@ def _bound(host: str, port: int) -> socket.socket:
     """Return a socket that listens: who comes before the server has begun waits for it."""
     try:
         family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        return socket.create_server(address, family=family)
+        both = family == socket.AF_INET6  # an address of all: of IPv4 too
+        return socket.create_server(address, family=family, dualstack_ipv6=both)
     except OSError as error:
         raise InputError(f"--host {host} --port {port}: {error.strerror or error}") from None
 
