@@ -6,6 +6,7 @@ What is refused before any work is in `test_cli_refused.py`.
 import json
 import os
 import re
+import select
 import socket
 import subprocess
 import sys
@@ -112,9 +113,11 @@ def test_one_pass_through_every_command(plan: Path, out: Path, tmp_path: Path) -
         flown = run("fly", out, "--to", to, "--solution", save, "--arm", "--stream", "--json",
                     "--log", log, "--radio", f"udp:127.0.0.1:{port}")  # fmt: skip
         assert flown.exit_code == 0, flown.output
-        radio.settimeout(0.1)
-        slots = [json.loads(radio.recv(65_536))["slot"] for _ in range(20)]
+        slots = []  # on a busy machine not all of the 32 are told
+        while select.select([radio], [], [], 0.1)[0]:
+            slots.append(json.loads(radio.recv(65_536))["slot"])
     assert slots == sorted(set(slots))
+    assert len(slots) > 4
     end = json.loads(flown.stdout.splitlines()[-1])
     assert (end["ending"], slots[0]) == ("finished", 0)
     assert end["flight"]["flown"]["delivered_rate"] > 0.97 * told["delivered_rate"]
