@@ -18,7 +18,6 @@ from faao_mav.mission.command import (
     POLYGON,
     RALLY_POINT,
     Command,
-    Frame,
 )
 from faao_mav.mission.item import MissionItem
 
@@ -113,7 +112,8 @@ class Dialect:
     # parameters; what has no place is stored at 0, 0, 0 unless it `keeps_idle` numbers
     placed: Mapping[int, Codecs]
     unplaced: Mapping[int, Codecs]
-    # The frames in which it takes those and these, and in which it gives them back
+    # The frames in which it takes those and these, and in which it gives them back; what has a
+    # place in frame 2 (MISSION) is above sea level
     frames: Mapping[int, int]
     idle_frames: Mapping[int, int]
     # What a DO_CHANGE_SPEED changes, None for one that changes nothing
@@ -135,11 +135,6 @@ class Dialect:
     endings: frozenset[int] = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
     # Whether, by the vehicle's parameters, a take-off behind a landing is flown
     flies_on: Callable[[ParameterValues], bool] = lambda _: False
-
-    @property
-    def placed_in_mission_frame(self) -> bool:
-        """Whether items in frame 2 (MISSION) may have a place too, above sea level."""
-        return Frame.MISSION in self.frames
 
     def sent(self, item: MissionItem) -> MissionItem:
         """Return `item` as it is sent: what is not set as 0 where NaN is refused.

@@ -6,6 +6,7 @@ and the return are climbs and descents at constant speed with what the autopilot
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +14,11 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.model import LONGEST, FlightPath, Track
-from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
 from faao_mav.autopilot.vehicle import Vehicle
+from faao_mav.autopilot.vehicle_type import Orbit, height_above_home
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import FLOWN_TO, HOLDING, Command
+from faao_mav.mission.command import FLOWN_TO, HOLDING, LANDINGS, TAKEOFFS, Command
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
 from faao_mav.vector import Vector
 
@@ -31,7 +32,6 @@ work at most, whatever a file or a peer asks for."""
 
 _REPEATS = 20  # How often a jump that never ends is followed. Chosen.
 _SAME_PLACE = 0.01  # The distance, m, below which two places are one.
-
 _SHORTEST = 1e-3  # The shortest motion, s, that is worth a sample.
 
 
@@ -67,7 +67,8 @@ def predict(
         empty, reached = np.empty((0, 3)), np.full(len(mission.items), np.nan)
         none, frame = np.empty(0, dtype=int), frame or LocalFrame(0.0, 0.0)
         return Track(np.empty(0), empty, empty, none, reached, frame)
-    walk = _Walk(mission, vehicle, frame or LocalFrame(*start), step, start, wind)
+    frame = frame or LocalFrame(*start)
+    walk = _Walk(mission, vehicle, frame, step, wind, np.append(frame.to_local(*start), 0.0))
     for index, item in _in_order(mission):
         walk.take(index, item)
         if walk.over:
@@ -109,28 +110,27 @@ class _Stop(NamedTuple):
     radius: float = 0.0
 
 
+@dataclass
 class _Walk:
     """The flight so far, and the stretch still to be flown in one go from where it rests."""
 
-    def __init__(
-        self,
-        mission: Mission,
-        vehicle: Vehicle,
-        frame: LocalFrame,
-        step: float,
-        start: tuple[float, float],
-        wind: Vector,
-    ) -> None:
-        self._mission, self._vehicle, self._frame = mission, vehicle, frame
-        self._step, self._wind, self._type, self._changed = step, wind, vehicle.type, vehicle
-        self._model = vehicle.flight_model(frame.latitude)
+    _mission: Mission
+    _vehicle: Vehicle
+    _frame: LocalFrame
+    _step: float
+    _wind: Vector
+    _home: Real  # (3,), m
+    over: bool = False
+    _clock: float = 0.0
+    _stretch: list[_Stop] = field(default_factory=list)
+    _parts: list[tuple[Real, Real, Real, Real]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._type, self._changed, self._place = self._vehicle.type, self._vehicle, self._home
+        self._model = self._vehicle.flight_model(self._frame.latitude)
         self._speed = self._model.cruise_speed
         self._longest = LONGEST_COPTER if self._type.hovers else LONGEST
-        self._home = self._place = np.append(frame.to_local(*start), 0.0)
-        self._stretch: list[_Stop] = []
-        self._parts: list[tuple[Real, Real, Real, Real]] = []
-        self._clock, self.over = 0.0, False
-        self._reached = np.full(len(mission.items), np.nan)
+        self._reached = np.full(len(self._mission.items), np.nan)
 
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
@@ -140,7 +140,9 @@ class _Walk:
             case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
                 self._take_off(index, item)
             case Command.NAV_LAND | Command.NAV_VTOL_LAND:
-                self._land(index, item)
+                ground = self._spot(index, item)[:2]
+                self._towards(index, np.array([*ground, self._last[2]]))
+                self._descend(index, ground)
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
             case Command.NAV_DELAY if self._type.hovers:
@@ -217,11 +219,7 @@ class _Walk:
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         self._fly()
-        here = self._type.dialect.zero_means_here and not (item.x or item.y)
-        if here or math.isnan(item.x) or math.isnan(item.y):
-            goal = np.array([*self._place[:2], self._height(index, item)])
-        else:
-            goal = self._spot(index, item)
+        goal = self._spot(index, item)
         if self._type.hovers:
             lasting = self._vehicle.climb_time(float(goal[2] - self._place[2]), take_off=True)
             self._go(index, np.array([*self._place[:2], goal[2]]), lasting)
@@ -235,9 +233,10 @@ class _Walk:
 
         Speeds on it are those in calm air.
         """
-        here = self._last
-        edge = orbit.edge(center[:2], here[:2])
-        self._towards(index, np.array([*edge, here[2] if orbit.climbs else center[2]]))
+        here, middle = self._last, complex(*center[:2])
+        edge = orbit.edge(middle, complex(*here[:2]))
+        up = here[2] if orbit.climbs else center[2]
+        self._towards(index, np.array([edge.real, edge.imag, up]))
         self._fly()
         rise = float(center[2] - self._place[2])
         rate = self._vehicle.value("climb_speed" if rise > 0 else "descent_speed")
@@ -246,7 +245,7 @@ class _Walk:
             t = self._times(lasting)
             # angles count from east to north
             turning = (-1j if orbit.clockwise else 1j) * orbit.speed(self._speed) / orbit.radius
-            out = complex(*(edge - center[:2])) * np.exp(turning * t)
+            out = (edge - middle) * np.exp(turning * t)
             along, climbs = turning * out, t < abs(rise) / rate
             if self._type.hovers:
                 along[[0, -1]] = 0.0
@@ -257,15 +256,6 @@ class _Walk:
         self._reached[index] = self._clock
         self.over = self.over or orbit.endless
 
-    def _land(self, index: int, item: MissionItem) -> None:
-        here = self._last
-        self._height(index, item)
-        ground = here[:2]
-        if (item.x or item.y) and not (math.isnan(item.x) or math.isnan(item.y)):
-            ground = self._frame.to_local(item.x, item.y)
-        self._towards(index, np.array([*ground, here[2]]))
-        self._descend(index, ground)
-
     def _return(self, index: int) -> None:
         self._fly()
         place = self._vehicle.returns_to(self._mission, self._frame, self._place, self._home)
@@ -274,9 +264,8 @@ class _Walk:
             up = np.array([*self._place[:2], place[2]])
             self._go(index, up, self._vehicle.climb_time(rise))
         self._speed = self._model.cruise_speed
-        orbit = self._vehicle.orbit(CIRCLING)
-        if orbit is not None and not self._type.hovers:
-            self._circle(index, place, orbit)
+        if (waiting := self._vehicle.waiting) is not None:
+            self._circle(index, place, waiting)
         else:
             self._towards(index, place)
             self._descend(index, place[:2])
@@ -324,13 +313,21 @@ class _Walk:
             self._model = self._changed.flight_model(self._frame.latitude)
 
     def _spot(self, index: int, item: MissionItem) -> Real:
-        """Return the place of `item`, (3,) m."""
+        """Return the place of `item`, (3,) m; that of the aircraft where 0, 0 stands for it.
+
+        So does what is not set, of a take-off or a landing.
+        """
+        up, landing = self._height(index, item), item.command in LANDINGS
+        unset = math.isnan(item.x + item.y) and (landing or item.command in TAKEOFFS)
+        zero = (landing or self._type.dialect.zero_means_here) and not (item.x or item.y)
+        if unset or zero:
+            return np.append(self._last[:2], up)
         if not (abs(item.x) <= 90 and abs(item.y) <= 180):
             raise InputError(
                 f"mission item {index + 1}: {item.x}, {item.y} is no place to fly to; "
                 "expected degrees"
             )
-        return np.append(self._frame.to_local(item.x, item.y), self._height(index, item))
+        return np.append(self._frame.to_local(item.x, item.y), up)
 
     def _height(self, index: int, item: MissionItem) -> float:
         """Return the height of `item` above home, m."""

@@ -12,14 +12,15 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body, CopterBody
 from faao_mav.autopilot.model import Model
-from faao_mav.autopilot.orbit import Orbit
 from faao_mav.autopilot.vehicle_type import (
     AutopilotFamily,
+    Orbit,
     VehicleType,
     lean_acceleration,
 )
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
+from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Mission, MissionItem
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
@@ -178,6 +179,12 @@ class Vehicle:
     def orbit(self, item: MissionItem) -> Orbit | None:
         """Return how it circles at `item`, None where it does not."""
         return self.type.orbits(self, self.type.dialect.sent(item))
+
+    @property
+    def waiting(self) -> Orbit | None:
+        """How it circles where its mission or its return ends; None for what hovers there."""
+        waits = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
+        return None if self.type.hovers else self.orbit(waits)
 
     def returns_to(self, mission: Mission, frame: LocalFrame, here: Real, home: Real) -> Real:
         """Return where and how high a return from `here` (3,), m in `frame`, goes, (3,).

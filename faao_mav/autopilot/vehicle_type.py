@@ -3,18 +3,19 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from faao_mav.arrays import Real
+import numpy as np
+
+from faao_mav.arrays import Complex, Real
 from faao_mav.autopilot.body import Body
 from faao_mav.autopilot.dialect import Dialect
-from faao_mav.autopilot.failsafe import Failsafe
-from faao_mav.autopilot.manners import FenceAction, Manners, Modes, SetpointRules
-from faao_mav.autopilot.model import Model
-from faao_mav.autopilot.orbit import Orbit, RallyRule
+from faao_mav.autopilot.manners import Failsafe, FenceAction, Manners, Modes, SetpointRules
+from faao_mav.autopilot.model import Model, unit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.item import MissionItem
+from faao_mav.mission.command import ABOVE_SEA, Command, Frame
+from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.power import GRAVITY
 
 OVERSPEED = 1.1
@@ -25,6 +26,89 @@ for corners. Chosen; what a change costs is not measured."""
 def lean_acceleration(angle: float) -> float:
     """Return the level acceleration at the lean or bank `angle`, rad, at constant height, m/s²."""
     return GRAVITY * math.tan(angle)
+
+
+@dataclass(frozen=True, slots=True)
+class Orbit:
+    """A circle about the place of an item: `radius`, m, and the greatest `turn_rate`, rad/s.
+
+    It is flown for so many `turns`, or for so many `seconds`; if it `climbs` until it is at its
+    height, and if it is `endless` for good. `clockwise` as seen from above. Places are m east + i m
+    north.
+    """
+
+    radius: float
+    clockwise: bool
+    turns: float = 0.0
+    seconds: float = 0.0
+    climbs: bool = False
+    endless: bool = False
+    turn_rate: float = math.inf
+
+    def speed(self, commanded: float) -> float:
+        """Return the speed along the circle, m/s, where `commanded` is flown on straights."""
+        return min(commanded, self.turn_rate * self.radius)
+
+    def lasting(self, commanded: float, climb: float = 0.0) -> float:
+        """Return how long it is flown, s; `climb` is how long the change of height takes, s.
+
+        Of an endless one it is one turn.
+        """
+        around = 2 * math.pi * self.radius / self.speed(commanded)
+        turns = max(self.turns, 1.0) if self.endless else self.turns
+        return max(turns * around, self.seconds, climb)
+
+    def edge(self, center: complex, towards: complex) -> complex:
+        """Return the place of the circle about `center` that is nearest to `towards`, m."""
+        return center + self.radius * (unit(towards - center) or 1j)
+
+    def outline(self, center: complex, corners: int = 72) -> Complex:
+        """Return a closed polygon (corners + 1,) around the circle about `center`, m."""
+        angle = np.linspace(0.0, 2 * np.pi, corners + 1)
+        wide = self.radius / math.cos(np.pi / corners)
+        return np.asarray(center + 1j * wide * np.exp(-1j * angle))
+
+
+def orbit_at(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+    """Return how `item` is circled at, None where it is not.
+
+    The radius is the item's, param3 or of a LOITER_TO_ALT param2, and without one the vehicle's
+    `loiter_radius`; negative ones turn left.
+    """
+    own = item.params[1 if item.command == Command.NAV_LOITER_TO_ALT else 2]
+    given = own if math.isfinite(own) and own != 0 else vehicle.value("loiter_radius")
+    number = item.params[0] if math.isfinite(item.params[0]) else 0.0
+    radius, clockwise = abs(given), given > 0
+    match item.command:
+        case Command.NAV_LOITER_TURNS:
+            return Orbit(radius, clockwise, turns=max(number, 0.0))
+        case Command.NAV_LOITER_TIME:
+            return Orbit(radius, clockwise, seconds=max(number, 0.0))
+        case Command.NAV_LOITER_TO_ALT:
+            return Orbit(radius, clockwise, climbs=True)
+        case Command.NAV_LOITER_UNLIM:
+            return Orbit(radius, clockwise, endless=True)
+    return None
+
+
+class RallyRule(NamedTuple):
+    """Where a return goes: to the nearest rally point within `limit`, m, else home.
+
+    With `home` that is one of the places to choose from, the nearest of which is it.
+    """
+
+    limit: float = math.inf
+    home: bool = True
+
+
+def height_above_home(item: MissionItem, mission: Mission) -> float:
+    """Return the height of `item` above home, m; NaN where that needs home's and it is not told.
+
+    Heights above terrain count as if the ground were as high as home.
+    """
+    if item.frame not in ABOVE_SEA and item.frame != Frame.MISSION:
+        return item.z
+    return item.z - mission.home.altitude if mission.home is not None else math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,10 +9,10 @@ from itertools import islice
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Complex
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.autopilot.dialect import SpeedChange
-from faao_mav.autopilot.orbit import CIRCLING, Orbit, height_above_home
+from faao_mav.autopilot.vehicle_type import Orbit, height_above_home
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
@@ -31,15 +31,14 @@ HOME = -1
 
 @dataclass(frozen=True, slots=True)
 class PlacedItem:
-    """Where an item flies to: metres east and north of `ValidationContext.frame`, and above home.
+    """Where an item flies to, in `ValidationContext.frame`.
 
-    `index` is the item's, `HOME` for home. `up` is NaN where nothing tells it: heights above
-    terrain, or above the sea without a home.
+    `index` is the item's, `HOME` for home; `place` is m east + i m north, `up` m above home: NaN
+    where nothing tells it, as above terrain, or above the sea without a home.
     """
 
     index: int
-    east: float
-    north: float
+    place: complex
     up: float
 
     @property
@@ -48,14 +47,9 @@ class PlacedItem:
         return "home" if self.index == HOME else f"item {self.index + 1}"
 
     @property
-    def ground(self) -> Real:
-        """East and north, (2,) m."""
-        return np.array([self.east, self.north])
-
-    @property
     def from_origin(self) -> float:
         """Metres over ground from the origin of the frame, which is home if there is one."""
-        return math.hypot(self.east, self.north)
+        return abs(self.place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +68,14 @@ class Straight:
     jump: bool = False
 
     @property
+    def way(self) -> complex:
+        """Metres east + i metres north from its start to its end."""
+        return self.end.place - self.start.place
+
+    @property
     def length(self) -> float:
         """Metres over ground."""
-        return math.hypot(*(self.end.ground - self.start.ground))
+        return abs(self.way)
 
     @property
     def rise(self) -> float:
@@ -85,8 +84,7 @@ class Straight:
 
     def turn(self, onward: "Straight") -> float:
         """Return the turn from here to the straight `onward`, rad, 0 to pi; 0 without a heading."""
-        before, after = (complex(*(each.end.ground - each.start.ground)) for each in (self, onward))
-        return abs(cmath.phase(after * before.conjugate()))
+        return abs(cmath.phase(onward.way * self.way.conjugate()))
 
 
 @dataclass(frozen=True)
@@ -109,6 +107,8 @@ class ValidationContext:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vehicle", self.vehicle.usable())
+        if self.frame is None or self.track is None or not len(self.track.t):
+            object.__setattr__(self, "track", None)
 
     @property
     def items(self) -> tuple[MissionItem, ...]:
@@ -174,10 +174,10 @@ class ValidationContext:
         first = self.mission.first_place
         return None if first is None else LocalFrame(*first)
 
-    @cached_property
+    @property
     def home(self) -> PlacedItem | None:
         """Home, at the origin of the local frame, or None."""
-        return PlacedItem(HOME, 0.0, 0.0, 0.0) if self.mission.home is not None else None
+        return PlacedItem(HOME, 0j, 0.0) if self.mission.home is not None else None
 
     @cached_property
     def places(self) -> tuple[PlacedItem, ...]:
@@ -193,16 +193,15 @@ class ValidationContext:
             for k, item in self.each(*FLOWN_TO)
             if abs(item.x) <= 90
             and abs(item.y) <= 180
-            and (item.frame != Frame.MISSION or dialect.placed_in_mission_frame)
+            and (item.frame != Frame.MISSION or Frame.MISSION in dialect.frames)
             and (dialect.zero_means_here or not at_zero(item))
         ]
         local = self.frame.to_local([item.x for _, item in placed], [item.y for _, item in placed])
-        here, places = (0.0, 0.0), []
-        for (k, item), (east, north) in zip(placed, local.tolist(), strict=True):
-            if not at_zero(item):
-                here = (east, north)
-            if all(map(math.isfinite, here)):  # not so at the antipode
-                places.append(PlacedItem(k, *here, self.height(item)))
+        here, places = 0j, []
+        for (k, item), place in zip(placed, (local @ (1, 1j)).tolist(), strict=True):
+            here = here if at_zero(item) else place
+            if cmath.isfinite(here):  # not so at the antipode
+                places.append(PlacedItem(k, here, self.height(item)))
         return tuple(places)
 
     def height(self, item: MissionItem) -> float:
@@ -217,19 +216,19 @@ class ValidationContext:
         return {k: orbit for k, orbit in found if orbit is not None}
 
     @cached_property
-    def circles(self) -> dict[int, Real]:
-        """The outlines (k, 2), m, of circles by the index of their item.
+    def circles(self) -> dict[int, Complex]:
+        """The outlines (k,), m east + i m north, of circles by the index of their item.
 
         What cannot hover circles where a return ends, and where a mission without an end does.
         """
         placed = (place for place in self.places if place.index in self.orbits)
-        circles = {place.index: self.orbits[place.index].outline(place.ground) for place in placed}
-        waiting = self.vehicle.orbit(CIRCLING)
-        for last in self.legs[-1:] if waiting is not None else ():
-            returns = self.items[last.index].command == Command.NAV_RETURN_TO_LAUNCH
-            ends = self.items[last.index].command in LANDINGS or last.jump
-            if waiting and (returns or not (ends or last.end.index in self.orbits)):
-                circles[last.index] = waiting.outline(last.end.ground)
+        circles = {place.index: self.orbits[place.index].outline(place.place) for place in placed}
+        waiting, last = self.vehicle.waiting, self.legs[-1] if self.legs else None
+        if waiting is not None and last is not None:
+            command = self.items[last.index].command
+            ends = command in LANDINGS or last.jump or last.end.index in self.orbits
+            if command == Command.NAV_RETURN_TO_LAUNCH or not ends:
+                circles[last.index] = waiting.outline(last.end.place)
         return circles
 
     @cached_property
@@ -255,7 +254,7 @@ class ValidationContext:
                 spline = item.command == Command.NAV_SPLINE_WAYPOINT
                 yield Straight(k, here, place, speed, spline=spline)
             elif here is not None and self.home and item.command == Command.NAV_RETURN_TO_LAUNCH:
-                yield Straight(k, here, self._returns_to(here, self.home), speed)
+                yield Straight(k, here, self._returns_to(here), speed)
             elif here is not None and k in targets:
                 after = (place for place in self.places if place.index >= targets[k])
                 yield from (Straight(k, here, end, speed, jump=True) for end in islice(after, 1))
@@ -264,22 +263,23 @@ class ValidationContext:
     def _edge(self, place: PlacedItem, towards: PlacedItem) -> PlacedItem:
         """Return where a straight from `towards` meets the circle at `place`; it, without one."""
         orbit = self.orbits.get(place.index)
-        if orbit is None:
-            return place
-        east, north = orbit.edge(place.ground, towards.ground).tolist()
-        return replace(place, east=east, north=north)
+        return (
+            place if orbit is None else replace(place, place=orbit.edge(place.place, towards.place))
+        )
 
-    def _returns_to(self, here: PlacedItem, home: PlacedItem) -> PlacedItem:
+    def _returns_to(self, here: PlacedItem) -> PlacedItem:
         """Return where a return from `here` ends, at a height that nothing tells."""
         assert self.frame is not None
-        start = np.append(here.ground, here.up)
-        east, north, _ = self.vehicle.returns_to(self.mission, self.frame, start, home.ground)
-        return PlacedItem(HOME, float(east), float(north), math.nan)
+        start = np.array([here.place.real, here.place.imag, here.up])
+        east, north, _ = self.vehicle.returns_to(self.mission, self.frame, start, np.zeros(2))
+        return PlacedItem(HOME, complex(east, north), math.nan)
 
     @cached_property
-    def track_positions(self) -> Real | None:
-        """The track's positions (n, 3) in the local frame, or None without a track."""
-        return None if self.track is None or self.frame is None else self.track.within(self.frame)
+    def flown(self) -> Complex:
+        """Where the track is in the local frame, (n,), m east + i m north; n = 0 without one."""
+        if self.track is None or self.frame is None:
+            return np.empty(0, dtype=complex)
+        return np.asarray(self.track.within(self.frame)[:, :2] @ (1, 1j), dtype=complex)
 
 
 def at_zero(item: MissionItem) -> bool:

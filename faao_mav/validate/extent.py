@@ -107,10 +107,10 @@ def _distances(context: ValidationContext) -> Hits:
 @checks
 def _predicted(context: ValidationContext) -> Hits:
     """How far the predicted flight goes."""
-    track, positions, limits = context.track, context.track_positions, context.limits
-    if track is None or positions is None or not len(track.t):
+    track, limits = context.track, context.limits
+    if track is None:
         return
-    away = np.hypot(*positions[:, :2].T) * (context.home is not None)
+    away = np.abs(context.flown) * (context.home is not None)
     for limit, flown, what in (
         (limits.max_altitude, track.position[:, 2], "m above home; --max-altitude"),
         (limits.max_distance, away, "m from home; --max-distance"),
@@ -157,5 +157,5 @@ def _least_duration(context: ValidationContext) -> float:
     waiting = sum(hold for hold in holds if hold > 0)
     orbits = ((k, orbit) for k, orbit in context.orbits.items() if not orbit.endless)
     circling = sum(orbit.lasting(context.speeds[k]) for k, orbit in orbits)
-    predicted = float(track.t[-1]) if track is not None and len(track.t) else math.inf
+    predicted = float(track.t[-1]) if track is not None else math.inf
     return min(flying + waiting + circling, predicted)

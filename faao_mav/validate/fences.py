@@ -14,7 +14,6 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
-from faao_mav.vector import lengths
 
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
@@ -136,36 +135,34 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
 
 def _shapes(context: ValidationContext) -> list[Shapes]:
     """Return legs, circles, and the predicted flight from sample to sample."""
-    legs = np.array([[leg.start.ground, leg.end.ground] for leg in context.legs])
-    circles, flown = np.array([*context.circles.values()]), np.empty((1, 2))
-    if context.track_positions is not None:
-        flown = context.track_positions[:, :2]
-    steps, shapes = np.stack([flown[:-1], flown[1:]], axis=1), []
-    for corners in (legs, circles, steps):
-        corners = corners if len(corners) else steps[:0]
-        lines = np.asarray(shapely.linestrings(corners), dtype=object)
-        still = (corners == corners[:, :1]).all(axis=(1, 2))
-        lines[still] = shapely.points(corners[still, 0])
+    legs = np.array([[leg.start.place, leg.end.place] for leg in context.legs])
+    circles, flown, shapes = np.array([*context.circles.values()]), context.flown, []
+    for ways in (legs, circles, np.stack([flown[:-1], flown[1:]], axis=1)):
+        ways = ways if len(ways) else np.empty((0, 2))
+        lines = np.asarray(shapely.linestrings(ways.real, ways.imag), dtype=object)
+        still = (ways == ways[:, :1]).all(axis=1)
+        lines[still] = shapely.points(ways[still, 0].real, ways[still, 0].imag)
         shapes.append(lines)
     return shapes
 
 
 def _kept(context: ValidationContext, fence: _Fence) -> Hits:
     """Tell what the vehicle does at its fence, and where it looks ahead for it."""
-    vehicle, track, positions = context.vehicle, context.track, context.track_positions
+    vehicle, track = context.vehicle, context.track
     response = vehicle.type.at_fence(vehicle)
     if response.parameter and not response.keeps:
         value, name = context.parameter(response.parameter)
         does = "says so, and flies on" if response.action == "report" else "flies on"
         to, parameter = response.set_to, name.partition(",")[0]
         yield hit("fence-not-kept", does=does, name=name, value=value, parameter=parameter, to=to)
-    if track is None or positions is None or not response.keeps:
+    if track is None or not response.keeps:
         return
-    velocity, speed = track.velocity[:, :2], lengths(track.velocity[:, :2])
+    velocity = track.velocity[:, :2] @ (1, 1j)
+    speed = np.abs(velocity)
     ahead = vehicle.type.fence_ahead(vehicle, speed)
     if ahead.any():
-        heading = velocity / np.maximum(speed, _STILL)[:, None]
-        tested = np.asarray(shapely.points(positions[:, :2] + heading * ahead[:, None]))
+        there = context.flown + velocity / np.maximum(speed, _STILL) * ahead
+        tested = np.asarray(shapely.points(there.real, there.imag))
         for index, k in _firsts(fence.leave(tested) & (speed > _STILL), track.item):
             yield hit("fence-ahead", index, time=track.t[k], speed=speed[k], ahead=ahead[k])
 

@@ -128,7 +128,7 @@ def _landing(context: ValidationContext) -> Hits:
         entrance, landing = by_index[k - 1], by_index[k]
         orbits = item.command == Command.NAV_LOITER_TO_ALT and not math.isnan(item.params[1])
         radius, above = abs(item.params[1]) if orbits else 0.0, entrance.up - landing.up
-        away = math.hypot(entrance.east - landing.east, entrance.north - landing.north)
+        away = abs(entrance.place - landing.place)
         way = math.sqrt(max(away**2 - radius**2, 0.0))
         if above <= 0:
             yield hit("px4-approach-below", k, below=-above)

@@ -104,6 +104,8 @@ def test_take_offs() -> None:
     here = MissionItem(Command.NAV_TAKEOFF, Frame.GLOBAL_RELATIVE_ALT, z=20.0)
     track = flown(here, waypoint(50, 0))
     assert place(track, when(track, 0)) == pytest.approx([0, 0, 20], abs=0.1)
+    ways = TAKEOFF, waypoint(50, 0), replace(waypoint(0, 0), x=0.0, y=0.0)
+    assert predict(Mission(ways, HOME), COPTER).position[-1] == pytest.approx([50, 0, 30], abs=1)
     unset = replace(here, x=math.nan, y=math.nan)
     assert flown(unset, vehicle=PX4).position[-1] == pytest.approx([0, 0, 20], abs=0.1)
     with pytest.raises(InputError, match=r"more than 1\.5 h"):  # PX4 sets out for 0, 0

@@ -24,9 +24,8 @@ from faao_mav.autopilot.dialect import (
     whole,
 )
 from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules
-from faao_mav.autopilot.orbit import RallyRule
 from faao_mav.autopilot.parameter import ParameterValues, rule
-from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse, VehicleType
+from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse, RallyRule, VehicleType
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import LANDINGS, Command, Frame
 from faao_mav.mission.item import MissionItem

@@ -11,11 +11,10 @@ from faao_mav.autopilot.ardupilot import COPTER_DIALECT, SHARED, ardupilot_type,
 from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
-from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.manners import Modes
+from faao_mav.autopilot.manners import Modes, failsafes
 from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
-from faao_mav.autopilot.orbit import Orbit, orbit_at
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, Recommended, row, rule, table
+from faao_mav.autopilot.vehicle_type import Orbit, orbit_at
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem

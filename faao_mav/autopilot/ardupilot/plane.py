@@ -11,8 +11,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.autopilot.ardupilot import PLANE_DIALECT, SHARED, ardupilot_type, at_fence
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
-from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.manners import Modes
+from faao_mav.autopilot.manners import Modes, failsafes
 from faao_mav.autopilot.model import (
     SHORTEST,
     STEP,
@@ -24,8 +23,8 @@ from faao_mav.autopilot.model import (
     parameter,
     unit,
 )
-from faao_mav.autopilot.orbit import orbit_at
 from faao_mav.autopilot.parameter import Parameter, row, rule, table
+from faao_mav.autopilot.vehicle_type import orbit_at
 from faao_mav.power import GRAVITY
 
 _TURN = 1.2

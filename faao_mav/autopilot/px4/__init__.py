@@ -27,15 +27,22 @@ from faao_mav.autopilot.dialect import (
     single,
     whole,
 )
-from faao_mav.autopilot.failsafe import failsafes
-from faao_mav.autopilot.manners import FenceAction, LossAction, Manners, Modes, SetpointRules
-from faao_mav.autopilot.orbit import RallyRule, orbit_at
+from faao_mav.autopilot.manners import (
+    FenceAction,
+    LossAction,
+    Manners,
+    Modes,
+    SetpointRules,
+    failsafes,
+)
 from faao_mav.autopilot.parameter import ParameterValues, Recommended, row, rule, table
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
 from faao_mav.autopilot.vehicle_type import (
     AutopilotFamily,
     FenceResponse,
+    RallyRule,
     VehicleType,
+    orbit_at,
 )
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
