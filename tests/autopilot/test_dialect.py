@@ -1,33 +1,22 @@
 """What autopilots do with items: one test per fact, measured in simulation or read in sources."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from judged import COPTER, PLANE, PX4, at, do
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.dialect import SpeedChange
 from faao_mav.mission import MissionItem
 
-COPTER, PLANE = Vehicle("ardupilot", "copter"), Vehicle("ardupilot", "plane")
-PX4 = Vehicle("px4", "copter")
 NAN = math.nan
 
 
-def four(*params: float) -> tuple[float, float, float, float]:
-    one, two, three, four = (*params, *(0.0,) * (4 - len(params)))
-    return one, two, three, four
-
-
-def waypoint(
-    *params: float,
-    frame: int = 3,
-    x: float = -35.363262,
-    y: float = 149.165237,
-    z: float = 100.0,
-) -> MissionItem:
-    return MissionItem(16, frame, four(*params), x, y, z)
+def some(command: int, *params: float) -> MissionItem:
+    return at(0, 0, 3, *params, command=command)
 
 
 def refusal(item: MissionItem, vehicle: Vehicle) -> str | None:
@@ -37,10 +26,6 @@ def refusal(item: MissionItem, vehicle: Vehicle) -> str | None:
 def as_stored(item: MissionItem, vehicle: Vehicle) -> MissionItem:
     assert refusal(item, vehicle) is None
     return vehicle.type.dialect.stored(item)
-
-
-def some(command: int, *params: float) -> MissionItem:
-    return MissionItem(command, 3, four(*params), 1.0, 2.0, 3.0)
 
 
 def test_what_is_kept_of_parameters() -> None:
@@ -73,12 +58,15 @@ def test_ardupilot_takes_nan_as_a_yaw_only() -> None:
 
 
 def test_altitudes_and_degrees() -> None:
-    assert as_stored(waypoint(z=100.129), COPTER).z == pytest.approx(100.12, abs=1e-5)
-    assert as_stored(waypoint(z=-3.456), COPTER).z == pytest.approx(-3.45, abs=1e-5)
-    assert as_stored(waypoint(z=100.129), PX4).z == pytest.approx(100.129, abs=1e-5)
-    assert refusal(waypoint(z=NAN), PX4) is None
+    for vehicle, up, kept in (
+        (COPTER, 100.129, 100.12),
+        (COPTER, -3.456, -3.45),
+        (PX4, 9.129, 9.129),
+    ):
+        assert as_stored(at(0, 0, up), vehicle).z == pytest.approx(kept, abs=1e-5)
+    assert refusal(at(0, 0, NAN), PX4) is None
     for vehicle in (COPTER, PX4):
-        stored = as_stored(waypoint(x=12.34567894, y=-12.34567896), vehicle)
+        stored = as_stored(replace(some(16), x=12.34567894, y=-12.34567896), vehicle)
         assert (stored.x, stored.y) == (12.3456789, -12.3456790)
 
 
@@ -86,11 +74,11 @@ def test_frames() -> None:
     pairs = ((0, 0), (2, 0), (3, 3), (5, 0), (6, 3), (10, 10), (11, 10))
     for vehicle, taken in ((COPTER, pairs), (PX4, ((0, 5), (3, 6), (5, 5), (6, 6)))):
         for sent, read in taken:
-            assert as_stored(waypoint(frame=sent), vehicle).frame == read
+            assert as_stored(at(0, 0, 9, frame=sent), vehicle).frame == read
         give = f"give one of {', '.join(str(sent) for sent, _ in taken)}"
         for frame in {1, 2, 4, 7, 8, 10, 11} - {sent for sent, _ in taken}:
             told = f"takes no NAV_WAYPOINT in frame {frame}; {give}"
-            assert told in str(refusal(waypoint(frame=frame), vehicle))
+            assert told in str(refusal(at(0, 0, 9, frame=frame), vehicle))
 
 
 def test_items_without_a_place() -> None:
@@ -106,10 +94,10 @@ def test_items_without_a_place() -> None:
 
 def test_what_is_refused() -> None:
     for item, part in (
-        (waypoint(x=91.0), "latitude 91"),
-        (waypoint(y=NAN), "longitude nan"),
-        (waypoint(z=NAN), "altitude nan"),
-        (waypoint(z=83_000.0), "below 83000"),
+        (replace(some(16), x=91.0), "latitude 91"),
+        (replace(some(16), y=NAN), "longitude nan"),
+        (at(0, 0, NAN), "altitude nan"),
+        (at(0, 0, 83_000.0), "below 83000"),
     ):
         assert part in str(refusal(item, COPTER))
     assert refusal(some(82), COPTER) is None
@@ -135,8 +123,7 @@ def test_speed_changes() -> None:
         (PX4, 1, -1.0, SpeedChange("horizontal", None)),
         (PX4, 1, NAN, SpeedChange("horizontal", None)),
     ):
-        item = MissionItem(178, 2, (float(kind), speed, -1.0, 0.0))
-        assert vehicle.type.dialect.speed_change(item) == change
+        assert vehicle.type.dialect.speed_change(do(178, kind, speed, -1)) == change
 
 
 numbers = st.floats(-1e5, 1e5)
@@ -152,7 +139,7 @@ def accepted(draw: st.DrawFn, vehicle: Vehicle) -> MissionItem:
         draw(st.floats(-180, 180)),
         draw(st.floats(-1000, 10_000)),
     )
-    return item if refusal(item, vehicle) is None else waypoint()
+    return item if refusal(item, vehicle) is None else some(16)
 
 
 @pytest.mark.parametrize("vehicle", [COPTER, PLANE, PX4])
