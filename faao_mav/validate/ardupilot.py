@@ -26,8 +26,7 @@ _REQUIRED = {
 }
 """The items that bits of ARMING_MIS_ITEMS ask for."""
 
-RALLY_BIT = 32
-"""The bit of ARMING_MIS_ITEMS that asks for a rally point."""
+RALLY_BIT = 32  # The bit of ARMING_MIS_ITEMS that asks for a rally point.
 
 _SAME_HEIGHT = 1.0
 """The height, m, by which home may be moved in flight: less does not matter. Chosen; at home's own

@@ -24,25 +24,18 @@ from faao_mav.validate.demands import LATE_START, LinkCheck, Stretch
 from faao_mav.validate.flown import Line, departure
 from faao_mav.vector import distances_to_path, lengths
 
+# Seconds about a departure like the plan's, of which the best fit is taken. A mission sets out up
+# to `MOST_LEAD` before its plan. The step of 0.1 s is that of predicted flights.
 _LEADS = np.arange(-MOST_LEAD, MOST_LEAD + 0.05, 0.1)
-"""Seconds about a departure like the plan's, of which the best fit is taken.
-
-A mission sets out up to `MOST_LEAD` before its plan. The step of 0.1 s is that of predicted
-flights."""
-
+# Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen.
 _EVERY = 10
-"""Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen."""
-
-_LEAST = 1e-6
-"""The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen."""
-
+_LEAST = 1e-6  # The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen.
+# Metres below flight.altitude from which a predicted flight has to be clear of the ground that is
+# higher than that. Chosen: lower down it takes off or lands.
 _LOWER = 2.0
-"""Metres below flight.altitude from which a predicted flight has to be clear of the ground that is
-higher than that. Chosen: lower down it takes off or lands."""
-
+# Degrees and factor of distance by which a slot may be beyond what was measured, and the share of
+# slots that may be farther beyond it. Chosen.
 _ANGLE, _FACTOR, _SHARE = 1.0, 1.05, 0.1
-"""Degrees and factor of distance by which a slot may be beyond what was measured, and the share of
-slots that may be farther beyond it. Chosen."""
 
 
 def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Prediction]:

@@ -18,15 +18,11 @@ from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, 
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target
 from faao_mav.validate.demands import EnergyUse, Limits, LinkCheck
 
+# Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST).
 NAV_LAST = 95
-"""Commands up to this number fly; the others do something on the way (MAV_CMD_NAV_LAST)."""
-
+# The largest number of single precision, which messages have.
 LARGEST = float(np.finfo(np.float32).max)
-"""The largest number of single precision, which messages have."""
-
-
-HOME = -1
-"""The index of home, which is no item."""
+HOME = -1  # The index of home, which is no item.
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,43 +9,30 @@ from faao_mav.validate.context import ValidationContext
 from faao_mav.validate.demands import LATE_START
 from faao_mav.validate.rule import Hits, checks, hit
 
+# The share of what is planned, %, below which something can be won back. Chosen.
 GOOD_PERCENT = 99.5
-"""The share of what is planned, %, below which something can be won back. Chosen."""
-
+# By how many seconds, and by which share of the planned duration, a flight ends late that does not
+# keep its plan: both are exceeded. Chosen.
 LATE, LATE_PERCENT = 3.0, 5.0
-"""By how many seconds, and by which share of the planned duration, a flight ends late that does not
-keep its plan: both are exceeded. Chosen."""
-
+# The rms distance from the plan at equal times that is reported, m: the missions of the sample
+# plans are predicted within 2.9 m.
 APART = 3.0
-"""The rms distance from the plan at equal times that is reported, m: the missions of the sample
-plans are predicted within 2.9 m."""
-
+# How far beyond the plan's path_tolerance the predicted path may lie, m: predictions are no better.
 PATH_ALLOWANCE = 0.2
-"""How far beyond the plan's path_tolerance the predicted path may lie, m: predictions are no
-better."""
-
+# The error of the altitude that is reported, m: from 100 m up it changes the rate by a tenth of a
+# decibel.
 ALTITUDE_ERROR = 2.0
-"""The error of the altitude that is reported, m: from 100 m up it changes the rate by a tenth of a
-decibel."""
-
+# The delivered rate, bit/s/Hz, below which a flight delivers next to nothing. Chosen: 20 kbit/s in
+# 20 MHz.
 NOTHING = 1e-3
-"""The delivered rate, bit/s/Hz, below which a flight delivers next to nothing. Chosen: 20 kbit/s in
-20 MHz."""
-
+# The noise power, dBm, above which no receiver works. Chosen: cities at HF have less in 1 MHz.
 _MOST_NOISE = -40.0
-"""The noise power, dBm, above which no receiver works. Chosen: cities at HF have less in 1 MHz."""
-
-_THERMAL = -174.0
-"""Thermal noise at 290 K, dBm in 1 Hz: k T."""
-
+_THERMAL = -174.0  # Thermal noise at 290 K, dBm in 1 Hz: k T.
+# The narrowest hop that is taken for granted without `bandwidth_mhz`: 1 kHz. Chosen.
 _LEAST_BANDWIDTH_MHZ = 1e-3
-"""The narrowest hop that is taken for granted without `bandwidth_mhz`: 1 kHz. Chosen."""
-
-_MOST_POWER = 50.0
-"""The transmit power, dBm, above which a station is asked about: 100 W. Chosen."""
-
+_MOST_POWER = 50.0  # The transmit power, dBm, above which a station is asked about: 100 W. Chosen.
+# How far below thermal noise, dB, a receiver's may be told before it is doubted. Chosen.
 _COOLED = 1.0
-"""How far below thermal noise, dB, a receiver's may be told before it is doubted. Chosen."""
 
 
 @checks

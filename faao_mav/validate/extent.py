@@ -9,28 +9,21 @@ from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import HOME, PlacedItem, ValidationContext
 from faao_mav.validate.rule import Hits, checks, hit
 
-FAR = 10.0
-"""The distance from home or from item to item, km, that is hardly meant. Chosen."""
-
+FAR = 10.0  # The distance from home or from item to item, km, that is hardly meant. Chosen.
+# The height, m above ground, that many countries allow without a permission.
 COMMON_CEILING = 120.0
-"""The height, m above ground, that many countries allow without a permission."""
-
+# The height, m above home, below which an item is about the ground: the estimate of the height is
+# no better. Chosen.
 LEAST_HEIGHT = 1.0
-"""The height, m above home, below which an item is about the ground: the estimate of the height is
-no better. Chosen."""
-
+# The height, m above home, that no vehicle here reaches; plans end there too. Chosen.
 HIGHEST = 20_000.0
-"""The height, m above home, that no vehicle here reaches; plans end there too. Chosen."""
-
+# By how much, m or s, the predicted flight may exceed a limit: aircraft wobble. Chosen.
 _WOBBLE = 1.0
-"""By how much, m or s, the predicted flight may exceed a limit: aircraft wobble. Chosen."""
-
+# Degrees from home within which a place lies if its exchanged coordinates are the slip. Chosen.
 _SWAPPED = 1.0
-"""Degrees from home within which a place lies if its exchanged coordinates are the slip. Chosen."""
-
+# Kilometres from home that no copter, and no plane, flies to. Chosen: twice what they do in the
+# hours that flights are predicted.
 _FARTHEST = {True: 100.0, False: 1_000.0}
-"""Kilometres from home that no copter, and no plane, flies to. Chosen: twice what they do in the
-hours that flights are predicted."""
 
 
 @checks

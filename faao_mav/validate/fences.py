@@ -18,15 +18,11 @@ from faao_mav.validate.rule import Hits, checks, hit
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
 
+# The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
+# what a change costs is not measured.
 LEAST_MARGIN = 2.0
-"""The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
-what a change costs is not measured."""
-
-_NAMED = 3
-"""Parts of the fence that a way is told to break, at most. Chosen: more help nobody."""
-
-_STILL = 0.1
-"""The speed, m/s, below which an aircraft heads nowhere. Chosen."""
+_NAMED = 3  # Parts of the fence that a way is told to break, at most. Chosen: more help nobody.
+_STILL = 0.1  # The speed, m/s, below which an aircraft heads nowhere. Chosen.
 
 
 class _Fence:

@@ -17,27 +17,21 @@ from faao_mav.schedule.schedule import positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.vector import distances_to_path, lengths
 
+# By so many metres from w_I the departure is told from anything else. Chosen: ten times the path
+# tolerance.
 _REACH = 20.0
-"""By so many metres from w_I the departure is told from anything else. Chosen: ten times the path
-tolerance."""
-
+# The share of that reach, rms, within which a departure is the predicted one. An aircraft that
+# stands at w_I instead is 0.45 of it away: sqrt(1/5), where it speeds up steadily. Chosen.
 _ALIKE = 0.25
-"""The share of that reach, rms, within which a departure is the predicted one. An aircraft that
-stands at w_I instead is 0.45 of it away: sqrt(1/5), where it speeds up steadily. Chosen."""
-
+# Seconds before the earliest departure that belong to it: the aircraft waits. Chosen.
 _BEFORE = 1.0
-"""Seconds before the earliest departure that belong to it: the aircraft waits. Chosen."""
-
-_COARSE, _FINE = 0.4, 0.02
-"""Steps in which the time of departure is searched, s. Chosen."""
-
+_COARSE, _FINE = 0.4, 0.02  # Steps in which the time of departure is searched, s. Chosen.
+# How many metres off the planned path weigh as much as a second before or after its time, where the
+# path comes by a place more than once, or rests there: as for the end of a flight.
 _METRES_PER_SECOND = 0.5
-"""How many metres off the planned path weigh as much as a second before or after its time, where
-the path comes by a place more than once, or rests there: as for the end of a flight."""
-
+# The relay flight ends within so many metres of w_F, and not more than so many seconds before its
+# time. Chosen.
 _AT_END, _AROUND_END = 5.0, 5.0
-"""The relay flight ends within so many metres of w_F, and not more than so many seconds before its
-time. Chosen."""
 
 
 class Line(NamedTuple):

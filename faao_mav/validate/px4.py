@@ -10,20 +10,15 @@ from faao_mav.mission.command import FLOWN_TO, LANDINGS, TAKEOFFS, Command, Fram
 from faao_mav.validate.context import HOME, NAV_LAST, Straight, ValidationContext, at_zero
 from faao_mav.validate.rule import Hits, checks, hit
 
-_SPARE_ANGLE = 0.1
-"""How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own."""
-
+_SPARE_ANGLE = 0.1  # How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own.
+# What a landing approach may start from.
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)
-"""What a landing approach may start from."""
-
+# The radius, m, below which an aircraft may miss it. Measured: it is off by up to 0.5 m.
 SMALLEST = 1.0
-"""The radius, m, below which an aircraft may miss it. Measured: it is off by up to 0.5 m."""
-
+# How much smaller, m, the next radius may be: the aircraft flies on that far while it switches.
 _NARROWER = 0.5
-"""How much smaller, m, the next radius may be: the aircraft flies on that far while it switches."""
-
+# The turn up to which the way back to a waypoint is no detour, rad. Chosen.
 _STRAIGHT = math.radians(5)
-"""The turn up to which the way back to a waypoint is no detour, rad. Chosen."""
 
 
 @checks

@@ -20,45 +20,30 @@ from faao_mav.vector import lengths
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
 
+# The share of the commanded speed, %, below which a leg is reported. Chosen.
 REACHED_PERCENT = 80.0
-"""The share of the commanded speed, %, below which a leg is reported. Chosen."""
-
+# The least time, s, that a reported run of slow legs loses: in less, corners are taken and speeds
+# are changed. Chosen.
 TIME_LOST = 2.0
-"""The least time, s, that a reported run of slow legs loses: in less, corners are taken and speeds
-are changed. Chosen."""
-
+# The share of the commanded speed, %, below which a row of legs is a crawl. Chosen.
 CRAWL_PERCENT = 50.0
-"""The share of the commanded speed, %, below which a row of legs is a crawl. Chosen."""
-
-CRAWL_LEGS = 5
-"""The least number of legs in a row that make a crawl. Chosen."""
-
+CRAWL_LEGS = 5  # The least number of legs in a row that make a crawl. Chosen.
+# By how much, %, a mission may command more than the plan's max_speed.
 SPARE_PERCENT = 100 * (OVERSPEED - 1)
-"""By how much, %, a mission may command more than the plan's max_speed."""
-
+# The length, m, below which a leg is a correction: it has no direction, and nobody speeds up on it.
+# Chosen.
 _SHORTEST = 1.0
-"""The length, m, below which a leg is a correction: it has no direction, and nobody speeds up on
-it. Chosen."""
-
-_SLOWEST = 0.1
-"""The least speed that is reckoned with, m/s, so that times stay finite."""
-
+_SLOWEST = 0.1  # The least speed that is reckoned with, m/s, so that times stay finite.
+# The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and PX4.
 SHARP = 45.0
-"""The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and
-PX4."""
-
+# The turn, rad, beyond which the room that it needs is not reckoned with more. Chosen.
 _REVERSAL = math.radians(179)
-"""The turn, rad, beyond which the room that it needs is not reckoned with more. Chosen."""
-
-_SLOW = 3.0
-"""The commanded speed, m/s, up to which corners hardly matter. Chosen."""
-
+_SLOW = 3.0  # The commanded speed, m/s, up to which corners hardly matter. Chosen.
+# m/s that are missing for want of lean from which on it is told: rounding is less. Chosen.
 _MISSING = 0.1
-"""m/s that are missing for want of lean from which on it is told: rounding is less. Chosen."""
-
+# The share of the climbing time that the way over ground may fall short to: less, and the leg is
+# steep. Chosen.
 _CLIMB_SHARE = 0.8
-"""The share of the climbing time that the way over ground may fall short to: less, and the leg is
-steep. Chosen."""
 
 
 @checks

@@ -3,28 +3,25 @@
 import math
 
 import pytest
-from judged import FRAME, HOME, PX4, given, latlon
+from judged import PX4, given, latlon
 
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.item import Mission
 from faao_mav.validate.context import HOME as AT_HOME
 from faao_mav.validate.context import ValidationContext
 
 
 def test_places_count_from_home_in_every_frame() -> None:
     items = "waypoint:0,9,30 waypoint:0,9,614/0 waypoint:0,9,614/5 waypoint:0,9,30/6"
-    assert [place.up for place in given(items).places] == [30, 30, 30, 30]
-    homeless = [place.up for place in given(f"homeless {items}").places]
-    assert [math.isnan(up) for up in homeless] == [False, True, True, False]
+    for home, expected in (("", [30, 30, 30, 30]), ("homeless", [30, None, None, 30])):
+        ups = [place.up for place in given(f"{home} {items}").places]
+        assert [None if math.isnan(up) else up for up in ups] == expected
     assert math.isnan(given("waypoint:0,9,30/10").places[0].up)
     case = given("waypoint:10,20,30 waypoint@0,0,15")  # here for ArduPilot, and Africa for PX4
-    here = case.places[1]
-    assert here.place == pytest.approx(10 + 20j, abs=1e-6)
-    assert here.up == 15
+    assert case.places[1].place == pytest.approx(10 + 20j, abs=1e-6)
+    assert case.places[1].up == 15
     assert len(ValidationContext(case.mission, PX4).places) == 1
     assert given("homeless delay=1 waypoint:5,5,9").frame == LocalFrame(*latlon(5, 5))
     assert given("homeless delay=1").frame is None
-    assert ValidationContext(Mission((), HOME), PX4).frame == FRAME
 
 
 def test_legs_follow_items_jumps_circles_and_the_way_home() -> None:

@@ -1,21 +1,22 @@
 """The rules: each speaks and is silent on both sides of its limit, and what holds for all."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import FLYABLE, SMALL, edited
-from judged import COPTER, LINK, VEHICLES, Given, check, given
+from judged import COPTER, LINK, VEHICLES, Given, check, given, track
 
 from faao_mav.autopilot.body import CopterBody
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.plan import Radio, parse_plan
+from faao_mav.plan import parse_plan
 from faao_mav.validate import RULES, Level, Stretch, validate
+from faao_mav.validate.comparison import compare_with_plan
 from faao_mav.validate.speeds import beyond_lean
-from faao_mav.workflow import Result, with_mission
 
 LIMITS = Path(__file__).parents[1] / "data" / "validate" / "limits.tsv"
 FLOWN = given("takeoff return").mission
@@ -39,47 +40,44 @@ def test_every_rule_is_tried_and_can_be_cited() -> None:
         assert rule.source
 
 
-def radio(**changes: float) -> Radio:
-    return parse_plan(edited(SMALL, {f"radio.{key}": v for key, v in changes.items()})).radio
-
-
 def test_a_doubtful_radio_is_told_with_the_likely_slip() -> None:
+    def judged(changes: Mapping[str, float]) -> Given:
+        plan = parse_plan(edited(SMALL, {f"radio.{key}": v for key, v in changes.items()}))
+        return Given(FLOWN, COPTER, link=replace(LINK, radio=plan.radio))
+
+    noise, power, band = "relay.noise_dbm", "base_station.power_dbm", {"bandwidth_mhz": 20}
+    density = "if it is a density (dBm/Hz), give -101.0 for the band"
     for trips, passes, action in (
-        ({"relay.noise_dbm": 91, "bandwidth_mhz": 20}, {"relay.noise_dbm": -91}, "mean -91?"),
-        (
-            {"relay.noise_dbm": -174, "bandwidth_mhz": 20},
-            {"relay.noise_dbm": -140},
-            "if it is a density (dBm/Hz), give -101.0 for the band",
-        ),
-        ({"relay.noise_dbm": -110, "bandwidth_mhz": 20}, {"relay.noise_dbm": -101}, ""),
-        ({"base_station.power_dbm": 100}, {"base_station.power_dbm": 40}, ""),
+        ({noise: 91, **band}, {noise: -91}, "mean -91?"),
+        ({noise: -174, **band}, {noise: -140}, density),
+        ({noise: -110, **band}, {noise: -101, **band}, ""),
+        ({power: 100}, {power: 40}, ""),
     ):
-        links = [replace(LINK, radio=radio(**changes)) for changes in (trips, passes)]
-        wrong, right = (Given(FLOWN, COPTER, link=link) for link in links)
-        check("radio-values", wrong, None, right)
-        assert action in wrong.by("radio-values")[0].action
+        check("radio-values", judged(trips), None, judged(passes))
+        assert action in judged(trips).by("radio-values")[0].action
 
 
 def test_a_route_beyond_what_the_gain_was_measured_at_is_told() -> None:
     """Two of the twenty slots may be beyond it by more than a degree or 5 %, a third is told."""
     solution = optimize(parse_plan(FLYABLE))
+    way = track([[*w, 40.0] for w in solution.w], [0] * 20, 8.0)
 
-    def told(hop: str, **measured: list[float]) -> list[str]:
+    def told(hop: str, **measured: list[float]) -> tuple[str, ...]:
         plan = parse_plan(edited(FLYABLE, {f"radio.{hop}": measured}))
-        flown = with_mission(Result(replace(solution, problem=build_problem(plan))))
-        found = [each for each in flown.findings if each.rule == "link-unmeasured"]
-        assert all(each.level is Level.WARNING for each in found)
-        return [each.message for each in found]
+        link, _ = compare_with_plan(replace(solution, problem=build_problem(plan)), way)
+        found = Given(FLOWN, COPTER, link=replace(LINK, unmeasured=link.unmeasured))
+        assert tuple(x.message for x in found.by("link-unmeasured")) == link.unmeasured
+        return link.unmeasured
 
     away = np.hypot(*(solution.w - np.array([60.0, 60.0])).T)
     d = np.sort(np.hypot(away, 40.0)).tolist()
     angle = np.sort(np.degrees(np.arctan2(40.0, away))).tolist()
     hop, least = "ground_user.gain", 0.01
-    assert told(hop, elevation_deg=[0, angle[-3] - 1 + least]) == []
+    assert told(hop, elevation_deg=[0, angle[-3] - 1 + least]) == ()
     (text,) = told(hop, elevation_deg=[0, angle[-3] - 1 - least])
     seen = f"the ground user sees the route {angle[0]:.0f} to {angle[-1]:.0f} degrees high"
     assert text == f"{seen}; the gain was measured from 0 to {angle[-3] - 1 - least:.0f}"
-    assert told(hop, distance_m=[d[2] * 1.05 - least, 1e5]) == []
+    assert told(hop, distance_m=[d[2] * 1.05 - least, 1e5]) == ()
     (text,) = told(hop, distance_m=[d[2] * 1.05 + least, 1e5])
     assert text.startswith(f"the route is {d[0]:.0f} to {d[-1]:.0f} m from the ground user; ")
     both = told("gain", elevation_deg=[0, 1], distance_m=[1e4, 1e5])
@@ -118,14 +116,10 @@ def test_what_findings_say() -> None:
     assert "PX4 says so (Geofence invalid), and flies the mission all the same" in found.message
 
 
-ODD = (
-    "takeoff change_speed=1,20,-1 waypoint@0,0,30 waypoint:0,9,0,2.5,3,3,3 waypoint:0,9,9/1 return"
-)
-
-
 def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> None:
+    odd = "change_speed=1,20,-1 waypoint@0,0,30 waypoint:0,9,0,2.5,3,3,3 waypoint:0,9,9/1"
     for vehicle in VEHICLES:
-        found = validate(Given(given(ODD).mission, vehicle))
+        found = validate(Given(given(f"takeoff {odd} return").mission, vehicle))
         other = "px4-" if vehicle.autopilot == "ardupilot" else "ardupilot-"
         assert found
         for finding in found:
@@ -135,13 +129,10 @@ def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> Non
 
 
 def test_worst_first_then_by_item_and_nothing_of_a_sound_mission() -> None:
-    order = [Level.ERROR, Level.WARNING, Level.NOTE]
     found = validate(given("homeless waypoint:0,9,0 waypoint:0,9,9/1 change_speed=1,0,-1"))
-    levels = [order.index(finding.level) for finding in found]
-    assert levels == sorted(levels)
-    assert len(set(levels)) == 3
-    errors = [finding.item or 0 for finding in found if finding.level is Level.ERROR]
-    assert errors == sorted(errors)
+    order = [([*Level].index(each.level), each.item or 0) for each in found]
+    assert order == sorted(order)
+    assert len({level for level, _ in order}) == 3
     way = "waypoint:0,100,30,6 waypoint:100,150,30 waypoint:200,160,30,10"
     for vehicle in ("copter", "px4", "px4 GF_MAX_HOR_DIST=nan"):  # which counts as not given
         assert validate(given(f"{vehicle} takeoff change_speed=1,8,-1 {way} return")) == ()

@@ -19,23 +19,12 @@ from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
 
+# The share by which an aircraft may be slower than its target before the target's clock waits for
+# it. The autopilot's own.
 _MARGIN = 0.05
-"""The share by which an aircraft may be slower than its target before the target's clock waits for
-it. The autopilot's own."""
-
-_SLOWEST = 0.75
-"""The least speed that is commanded, m/s. Measured, flown and planned, m rms, on a plan with two
-hovers at 9 m/s: with 0.4 6.0, with 0.75 1.6, with 1.5 1.3; with 1.5 other plans need more items and
-twice the time to convert."""
-
-_SHORTEST = 4.0
-"""The least length of a leg, m, where the path needs no shorter one: on such centimetres decide how
-long the target waits for an aircraft that has passed it. Flown: a mission with 1.1 m before a hover
-left there 4.1 s late, one with 2.3 m 0.4 s."""
-
+# The speed of the target, m/s, above which the aircraft's nose is along the target's way. Chosen;
+# what a change costs is not measured.
 _HEADED = 0.5
-"""The speed of the target, m/s, above which the aircraft's nose is along the target's way. Chosen;
-what a change costs is not measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +38,12 @@ class ArduCopter(ArduCopterLimits):
     waypoints are not stored by this autopilot, so `FlightPath.radii` do not count.
     """
 
-    least: ClassVar[float] = _SHORTEST
-    slowest: ClassVar[float] = _SLOWEST
+    # Centimetres decide on shorter legs how long the target waits for an aircraft that has passed
+    # it. Flown: a mission with 1.1 m before a hover left there 4.1 s late, one with 2.3 m 0.4 s.
+    least: ClassVar[float] = 4.0
+    # Measured, flown and planned, m rms, on a plan with two hovers at 9 m/s: with 0.4 6.0, with
+    # 0.75 1.6, with 1.5 1.3; with 1.5 other plans need more items and twice the time to convert.
+    slowest: ClassVar[float] = 0.75
 
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg that reaches `speed`, m: two ramps; same shape.
@@ -98,11 +91,8 @@ class _Flight(Flight):
     ) -> None:
         super().__init__(path.longest)
         stops, waits = target.passed[stopping].tolist(), path.holds[stopping].tolist()
-        self._limits, self._lean, self._stops = (
-            limits,
-            limits.lean,
-            list(zip(stops, waits, strict=True)),
-        )
+        self._limits, self._lean = limits, limits.lean
+        self._stops = list(zip(stops, waits, strict=True))
         self._clock, self._rate, self._resume, self.arrivals = 0.0, 1.0, waits[0], [0.0]
         self._adapting = -math.expm1(-STEP * limits.jerk / limits.acceleration)
         self._body = Copter(limits.body, complex(*target.motion[0, :2]), complex(*path.wind))
@@ -176,10 +166,10 @@ class _Flight(Flight):
         return complex(min(along, max(-along, turned.real)), across) * way
 
 
+# The recommended jerk, m/s³, and the one for bends at speed, with the greatest acceleration: its
+# documented maximum. Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5,
+# with a jerk of 10 4.4.
 _JERK, _LIVELIEST_JERK = 10.0, 20.0
-"""The recommended jerk, m/s³, and the one for bends at speed, with the greatest acceleration: its
-documented maximum. Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5,
-with a jerk of 10 4.4."""
 
 _BRAKE = 17
 _MODES = Modes(

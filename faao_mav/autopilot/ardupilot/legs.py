@@ -31,16 +31,13 @@ from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
 
+# The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
+# which none is longer than a second: the autopilot's own rule.
 _JERK_TIMES = 12.0
-"""The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
-which none is longer than a second: the autopilot's own rule."""
-
 FASTEST = 40.0  # The speed, m/s, that no leg comes to. Chosen above all that is commanded.
-
+# How often an interval is halved that holds what is sought, before it lies on a line between both
+# ends. Chosen: of 40 m/s 0.08 are left.
 _HALVINGS = 9
-"""How often an interval is halved that holds what is sought, before it lies on a line between both
-ends. Chosen: of 40 m/s 0.08 are left."""
-
 _LEAST_INPUT_TIME = 0.1  # The autopilot's own lower bound of ATC_INPUT_TC, s.
 
 

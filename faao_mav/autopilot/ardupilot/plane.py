@@ -27,27 +27,20 @@ from faao_mav.autopilot.parameter import Parameter, row, rule, table
 from faao_mav.autopilot.vehicle_type import orbit_at
 from faao_mav.power import GRAVITY
 
+# The least radius of a turn over the guidance's look-ahead, both in seconds of flight. Of random
+# plans whose turns had 1.05 at their airspeed, so less over ground against the wind, two were flown
+# 17 and 38 m rms from them; planned with 1.2 over ground these were 5.5 and 6.6 m off.
 _TURN = 1.2
-"""The least radius of a turn over the guidance's look-ahead, both in seconds of flight.
-
-Of random plans whose turns had 1.05 at their airspeed, so less over ground against the wind, two
-were flown 17 and 38 m rms from them; planned with 1.2 over ground these were 5.5 and 6.6 m off.
-"""
-
+# The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation).
 _INTERCEPT = math.sin(radians(45))
-"""The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation)."""
-
+# How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
+# airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside.
 _NOTICED = 0.05
-"""How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
-airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside."""
-
 _HEIGHT_TIME = 2.0  # The time constant with which a height is approached, s. Chosen.
-
+# The time constant with which a climb follows what the height asks for, s. Chosen.
 _CLIMB_LAG = 1.0
-"""The time constant with which a climb follows what the height asks for, s. Chosen."""
-
+# The least airspeed with which a flight begins, m/s. Chosen: nothing is divided by 0.
 _SLOWEST = 1.0
-"""The least airspeed with which a flight begins, m/s. Chosen: nothing is divided by 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,8 +231,8 @@ class _Flight(Flight):
 
 
 _LOITER, _RTL = 12, 11
+# PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL.
 _MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
-"""PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL."""
 
 _TABLE = table(
     *ArduPlane.parameters(),

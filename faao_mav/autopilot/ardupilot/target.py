@@ -8,17 +8,14 @@ from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, largest
 from faao_mav.autopilot.model import STEP
 
+# The length, m, below which a leg is none: its end counts as reached where it begins.
 _POINT = 1e-6
-"""The length, m, below which a leg is none: its end counts as reached where it begins."""
-
-
+# The greatest length of both tangents of a spline together, in lengths of its chord. The
+# autopilot's own.
 _SCALE = 4.0
-"""The greatest length of both tangents of a spline together, in lengths of its chord. The
-autopilot's own."""
-
+# About the distance, m, between the points at which a curve is evaluated. Chosen; what a change
+# costs is not measured.
 _SPACING = 0.5
-"""About the distance, m, between the points at which a curve is evaluated. Chosen; what a change
-costs is not measured."""
 
 
 def within(ways: Real, across: Real | float, vertical: Real | float) -> Real:
@@ -122,7 +119,6 @@ class Target:
         told = speed_along(ways, speeds, limits)
         in_force = speed_along(ways, np.where(joined, np.roll(speeds, 1), speeds), limits)
         early: Real = np.zeros(count)
-        begun, planned, top = legs.speeds(in_force, told)
         for _ in range(2):  # how early a leg begins depends on the speed at which the last one ends
             begun, planned, top = legs.speeds(in_force, told, np.roll(early, 1))
             slowest = np.minimum(told[:-1], in_force[1:])

@@ -23,41 +23,26 @@ from faao_mav.autopilot.px4.guidance import (
 
 POSITION_GAIN = 0.95  # MPC_XY_P, 1/s.
 VELOCITY_GAINS = (1.8, 0.4, 0.2)  # MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC.
-
+# How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
+# next, s. Fitted to recorded flights.
 SWITCH_DELAY = 0.065
-"""How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
-next, s. Fitted to recorded flights."""
-
+# How far the position estimate wanders along the way, m: an aircraft on its trajectory is taken to
+# be half of that behind it. Fitted to recorded flights.
 _WANDER = 0.17
-"""How far the position estimate wanders along the way, m: an aircraft on its trajectory is taken to
-be half of that behind it. Fitted to recorded flights."""
-
+# The least acceptance radius that is asked for on long legs, m. Measured: about 130 flights.
 _RADIUS = 4.0
-"""The least acceptance radius that is asked for on long legs, m. Measured: about 130 flights."""
-
+# The least acceptance radius that is asked for, m. Measured: where it flies, PX4's aircraft is off
+# by up to 0.5 m for seconds; 0.1 m held it for two minutes, 0.3 m for 6 s.
 _LEAST_RADIUS = 1.0
-"""The least acceptance radius that is asked for, m. Measured: where it flies, PX4's aircraft is off
-by up to 0.5 m for seconds; 0.1 m held it for two minutes, 0.3 m for 6 s."""
-
+# The turn at a waypoint, rad, below which a radius wider than the next one costs nothing. Chosen:
+# at 10 m from the waypoint it is 0.5 m.
 _STRAIGHT = np.radians(3.0)
-"""The turn at a waypoint, rad, below which a radius wider than the next one costs nothing. Chosen:
-at 10 m from the waypoint it is 0.5 m."""
-
+# The greatest acceptance radius as a share of the shorter leg at the waypoint. Chosen below 0.5, so
+# that the circles of two waypoints do not meet; a radius as long as its leg counts at once.
 _RADIUS_SHARE = 0.45
-"""The greatest acceptance radius as a share of the shorter leg at the waypoint. Chosen below 0.5,
-so that the circles of two waypoints do not meet; a radius as long as its leg counts at once."""
-
+# How much of a corner a wide acceptance radius may cut, m. Chosen; what a change costs is not
+# measured.
 _CUT = 1.0
-"""How much of a corner a wide acceptance radius may cut, m. Chosen; what a change costs is not
-measured."""
-
-_LEAST_LEG = 5.0
-"""The least length of a leg, m: two acceptance radii with which an aircraft half a metre off is in
-time. Chosen; what a change costs is not measured."""
-
-_SLOWEST = 1.5
-"""The least speed that is commanded, m/s. Measured: an aircraft that is half a metre off comes half
-a metre sooner or later to its waypoint, a second at 0.5 m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +58,11 @@ class Px4(Px4Limits):
     take-off on, and drag takes all of the lean limit at 49 m/s only.
     """
 
-    least: ClassVar[float] = _LEAST_LEG
-    slowest: ClassVar[float] = _SLOWEST
+    # Two acceptance radii with which an aircraft half a metre off is in time. Chosen.
+    least: ClassVar[float] = 5.0
+    # Measured: an aircraft half a metre off comes so much sooner or later to its waypoint, a second
+    # at 0.5 m/s.
+    slowest: ClassVar[float] = 1.5
 
     def shortest_leg(self, speed: Real) -> Real:
         """Return the least length of a leg flown at `speed`, m; same shape.

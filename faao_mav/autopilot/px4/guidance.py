@@ -10,22 +10,18 @@ import numpy as np
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
 from faao_mav.autopilot.model import TINY, FlightPath, Model, parameter, unit
 
+# The cosine of the angle between velocity and target from which an aircraft no longer counts as
+# turning (about 11 degrees). PX4's own.
 _ALIGNED = 0.98
-"""The cosine of the angle between velocity and target from which an aircraft no longer counts as
-turning (about 11 degrees). PX4's own."""
-
 _MOVING = 0.2  # The speed, m/s, from which an aircraft counts as turning. Chosen.
-
+# The least distance, m, at which a turning aircraft aims along its leg. PX4's own.
 _LOOKAHEAD = 5.0
-"""The least distance, m, at which a turning aircraft aims along its leg. PX4's own."""
-
+# The least speed, m/s, to which the slower of the horizontal and the vertical motion holds up the
+# other. PX4's own.
 _SLOW = 0.5
-"""The least speed, m/s, to which the slower of the horizontal and the vertical motion holds up the
-other. PX4's own."""
-
+# Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at such
+# a waypoint by chance (0.05 m took 53 s), which no prediction foretells.
 NEAREST = 0.05
-"""Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at
-such a waypoint by chance (0.05 m took 53 s), which no prediction foretells."""
 
 
 @dataclass(frozen=True, slots=True)
