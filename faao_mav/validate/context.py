@@ -208,7 +208,8 @@ class ValidationContext:
     @cached_property
     def orbits(self) -> dict[int, Orbit]:
         """How the vehicle circles, by the index of the item."""
-        found = ((k, self.vehicle.orbit(item)) for k, item in self.each(*FLOWN_TO))
+        sent = ((k, item) for k, item in self.each(*FLOWN_TO) if fits_message(item))
+        found = ((k, self.vehicle.orbit(item)) for k, item in sent)
         return {k: orbit for k, orbit in found if orbit is not None}
 
     @cached_property

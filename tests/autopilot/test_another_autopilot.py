@@ -132,7 +132,7 @@ def registered() -> Iterator[None]:
     unregister(COPTER)
 
 
-def test_a_mission_is_made_predicted_and_validated() -> None:
+def test_a_mission_is_made_predicted_and_validated_by_its_dialect_and_table() -> None:
     plan = parse_plan(PLAN)
     assert plan.aircraft.type is COPTER
     solution = optimize(plan)
@@ -148,10 +148,8 @@ def test_a_mission_is_made_predicted_and_validated() -> None:
     assert [f.rule for f in found.findings if f.level == "error"] == []
     assert not [f for f in found.findings if f.rule.startswith(("px4", "ardupilot"))]
 
-
-def test_its_rules_are_its_dialect_and_its_table() -> None:
     spline = MissionItem(Command.NAV_SPLINE_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=47, y=8, z=30)
-    mission = convert(optimize(parse_plan(PLAN))).mission
+    mission = conversion.mission
     judged = check(replace(mission, items=(*mission.items, spline)), Vehicle("toy"))
     assert "refused-on-upload" in {finding.rule for finding in judged.findings}
     full = check(replace(mission, items=mission.items * 99), Vehicle("toy"))
