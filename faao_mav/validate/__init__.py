@@ -9,7 +9,7 @@ from faao_mav.autopilot.dialect import name_of
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
-from faao_mav.validate import ardupilot, delivery, extent, fences, items, px4, speeds
+from faao_mav.validate import delivery, extent, fences, items, peculiar, speeds
 from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import EnergyUse, energy_use
 from faao_mav.validate.demands import Limits as Limits
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
     from faao_mav.schedule.prediction import Prediction
 
-_MODULES = (ardupilot, delivery, extent, fences, items, px4, speeds)
+_MODULES = (delivery, extent, fences, items, peculiar, speeds)
 _CONSTANTS: dict[str, object] = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 
 RULES = tuple(read_rules(_CONSTANTS))
