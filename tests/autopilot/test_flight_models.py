@@ -181,11 +181,7 @@ def test_legs_take_as_long_as_the_target_takes() -> None:
 
 
 def test_no_speed_means_cruise_speed_and_the_limit_holds() -> None:
-    for model, speed, fastest in (
-        (Px4(), 0.0, 5),
-        (Px4(cruise_speed=3), 0.0, 3),
-        (Px4(max_speed=6), 9.0, 6),
-    ):
+    for model, speed, fastest in ((Px4(cruise_speed=3), 0.0, 3), (Px4(max_speed=6), 9.0, 6)):
         flown = model.fly(line(200, 1, speed))
         assert flown.velocity[:, 0].max() == pytest.approx(fastest, abs=0.3)
 

@@ -91,8 +91,7 @@ class ArduCopterLimits(Model):
     def ramp(self, change: Real, acceleration: Real | float | None = None) -> "Ramp":
         """Return ramps by `change` >= 0, m/s, within its own or another `acceleration`, m/s²."""
         most, jerk, rise = acceleration, self.jerk, self.rise
-        if most is None:
-            most = self.acceleration
+        most = self.acceleration if most is None else most
         free = (rise + np.sqrt(rise**2 + 4 * change / jerk)) / 2
         full = most / jerk + rise
         steady = change > most * full
