@@ -12,7 +12,6 @@ def path_of(
     places: Sequence[complex],
     speed: float | Sequence[float] = 8.0,
     *,
-    radius: float = 0.0,
     holds: dict[int, float] | None = None,
     heights: Sequence[float] | None = None,
 ) -> FlightPath:
@@ -28,7 +27,7 @@ def path_of(
         np.broadcast_to(np.array(speed, dtype=float), (count - 1,)).copy(),
         waits,
         np.zeros(count, dtype=bool),
-        np.full(count, radius),
+        np.zeros(count),
     )
 
 

@@ -8,18 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.model import SHORTEST, STEP, Copter, Flight, FlightPath, Flown
-from faao_mav.autopilot.px4.guidance import (
-    NEAREST,
-    Axis,
-    GuidedLeg,
-    Px4Limits,
-    climb_setpoint,
-    corner_speed,
-    follow,
-    headed,
-    legs,
-    level_setpoint,
-)
+from faao_mav.autopilot.px4.guidance import NEAREST, Axis, GuidedLeg, Px4Limits, follow
 
 POSITION_GAIN = 0.95  # MPC_XY_P, 1/s.
 VELOCITY_GAINS = (1.8, 0.4, 0.2)  # MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC.
@@ -92,7 +81,7 @@ class Px4(Px4Limits):
 
     def corner_speed(self, turn: float) -> float:
         """Return how fast it passes a waypoint where it turns by `turn`, rad, in m/s."""
-        return corner_speed(self, self.acceptance_radius, cos(turn))
+        return self.passing_speed(self.acceptance_radius, cos(turn))
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
@@ -103,7 +92,7 @@ class Px4(Px4Limits):
         is then within its radius and may still be braking. Raises `InputError` for a flight of more
         than `path.longest` s: only flying tells how long it circles round a small radius.
         """
-        route, hold = legs(self, path), float(path.holds[0])
+        route, hold = self.legs(path), float(path.holds[0])
         flight = _Flight(self, path)
         arrivals, departures = [0.0], [hold + SWITCH_DELAY if hold > 0 else 0.0]
         flight.time = departures[0]
@@ -165,16 +154,15 @@ class _Flight(Flight):
         east, north, up = axes
         place = complex(east.position, north.position)
         velocity = complex(east.velocity, north.velocity)
-        midway, aim = place + velocity * (step / 2), headed(limits, leg, body.place)
-        direction, speed, self._remembered = level_setpoint(
-            limits, aim, midway, velocity, self._remembered
-        )
+        midway, aim = place + velocity * (step / 2), limits.headed(leg, body.place)
+        level = limits.level_setpoint(aim, midway, velocity, self._remembered)
+        direction, speed, self._remembered = level
         lag, (gain, integral, derivative) = place - body.place, VELOCITY_GAINS
         self._pace = self._paced(lag, velocity)
         climb, most = 0.0, limits.acceleration
         if self._climbs:
             height = up.position + up.velocity * (step / 2)
-            speed, climb = climb_setpoint(limits, aim, abs(aim.target - midway), height, speed)
+            speed, climb = limits.climb_setpoint(aim, abs(aim.target - midway), height, speed)
         wanted, count = direction * speed, 3 if self._climbs else 2
         axes[:count] = follow(
             axes[:count],

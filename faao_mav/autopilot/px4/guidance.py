@@ -25,6 +25,28 @@ NEAREST = 0.05
 
 
 @dataclass(frozen=True, slots=True)
+class GuidedLeg:
+    """A leg: horizontal places and directions are complex, east + i north.
+
+    `origin` m is where the leg begins, `target` m and `height` m are its end, `along` and `onward`
+    the unit directions of this leg and the next (0 where there is none), `speed` m/s the command,
+    `radius` m the acceptance radius, `hold` s how long to wait at the end; `exit_speed` and
+    `exit_climb` m/s bound how fast the end is passed.
+    """
+
+    origin: complex
+    target: complex
+    height: float
+    along: complex
+    onward: complex
+    speed: float
+    radius: float
+    hold: float
+    exit_speed: float
+    exit_climb: float
+
+
+@dataclass(frozen=True, slots=True)
 class Px4Limits(Model):
     """What bounds a multicopter's flight, in SI units; `body` is the aircraft.
 
@@ -64,133 +86,107 @@ class Px4Limits(Model):
             return self.climb_speed, self.climb_acceleration
         return self.descent_speed, self.descent_acceleration
 
+    def passing_speed(self, radius: float, cosine: float) -> float:
+        """Return how fast PX4 passes a waypoint of acceptance `radius`, m, where it turns, m/s.
 
-@dataclass(frozen=True, slots=True)
-class GuidedLeg:
-    """A leg: horizontal places and directions are complex, east + i north.
+        sqrt(g a R cot(θ/2)) with g = MPC_XY_TRAJ_P and `cosine` that of the turn θ.
+        """
+        half_turn = sqrt(max(1 + cosine, 0.0) / max(1 - cosine, 1e-9))
+        return sqrt(self.corner_gain * self.acceleration * radius * half_turn)
 
-    `origin` m is where the leg begins, `target` m and `height` m are its end, `along` and `onward`
-    the unit directions of this leg and the next (0 where there is none), `speed` m/s the command,
-    `radius` m the acceptance radius, `hold` s how long to wait at the end; `exit_speed` and
-    `exit_climb` m/s bound how fast the end is passed.
-    """
+    def legs(self, path: FlightPath) -> list[GuidedLeg]:
+        """Return the legs of `path`.
 
-    origin: complex
-    target: complex
-    height: float
-    along: complex
-    onward: complex
-    speed: float
-    radius: float
-    hold: float
-    exit_speed: float
-    exit_climb: float
+        Only the waypoint after the target is looked at: the aircraft must be able to stop there,
+        and it stops at the target if there is none, if it is told to hold, or if the next waypoint
+        lies within the acceptance radius. It goes on climbing there if the next leg does.
+        """
+        speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
+        speeds = np.minimum(speeds, self.max_speed)
+        radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)[1:]
+        radii = np.maximum(radii, NEAREST)
+        places, heights = path.points[:, 0] + 1j * path.points[:, 1], path.points[:, 2]
+        moves, rises = np.append(np.diff(places), 0j), np.append(np.diff(heights), 0.0)
+        following, holding = np.abs(moves[1:]), path.holds[1:] > 0
+        ahead = np.array([self.stopping_speed(each) for each in following.tolist()])
+        passable = (following > 1e-3) & (following >= radii) & ~holding
+        climbs_on = (rises[:-1] * rises[1:] > 0) & ~holding
+        climbs = np.where(rises[:-1] > 0, self.climb_speed, self.descent_speed)
+        ways = np.array([unit(move) for move in moves.tolist()])
+        where = places[:-1], places[1:], heights[1:], ways[:-1], ways[1:]
+        exits = np.minimum(ahead, speeds) * passable, climbs * climbs_on
+        how = speeds, radii, np.maximum(path.holds[1:], 0.0), *exits
+        columns = (each.tolist() for each in (*where, *how))
+        return [GuidedLeg(*each) for each in zip(*columns, strict=True)]
 
+    def headed(self, leg: GuidedLeg, place: complex) -> GuidedLeg:
+        """Return the leg that PX4 makes of `leg` for an aircraft at `place`, m.
 
-def corner_speed(limits: Px4Limits, radius: float, cosine: float) -> float:
-    """Return how fast PX4 passes a waypoint of acceptance `radius`, m, where it turns, m/s.
+        It heads for the leg's end; from behind its beginning and farther from there than the radius
+        first for the beginning, from farther beside it for its nearest point. So an aircraft that
+        enters a leg far from it, for the waypoint before was accepted from afar and this one has a
+        small radius, first flies to that waypoint. The leg that it makes begins at the aircraft; on
+        a detour it passes towards the end, and nothing is known of what follows. (FlightTaskAuto)
+        """
+        way = (place - leg.origin) * leg.along.conjugate()
+        if not leg.along:
+            return leg
+        if way.real > abs(leg.target - leg.origin):
+            return replace(leg, along=unit(leg.target - place))
+        if way.real < 0 and abs(way) > leg.radius:
+            target = leg.origin
+        elif abs(way.imag) > leg.radius:
+            target = leg.origin + way.real * leg.along
+        else:
+            return leg
+        following, exit_speed = abs(leg.target - target), 0.0
+        if following >= leg.radius:
+            exit_speed = min(self.stopping_speed(following), leg.speed)
+        along = unit(target - place)
+        return replace(leg, target=target, along=along, onward=leg.along, exit_speed=exit_speed)
 
-    sqrt(g a R cot(θ/2)) with g = MPC_XY_TRAJ_P and `cosine` that of the turn θ.
-    """
-    half_turn = sqrt(max(1 + cosine, 0.0) / max(1 - cosine, 1e-9))
-    return sqrt(limits.corner_gain * limits.acceleration * radius * half_turn)
+    def level_setpoint(
+        self, leg: GuidedLeg, place: complex, velocity: complex, remembered: float
+    ) -> tuple[complex, float, float]:
+        """Return unit direction and speed, m/s, asked for, and the speed to remember for turns.
 
+        `place` m and `velocity` m/s are the trajectory's. The speed is the least of the command,
+        what can be slowed to the passing speed at the target in time, and in a turn what was
+        allowed before it. The direction is to the target, in a turn to a point of the leg that is
+        max(R, 5 m) away. The target is passed with a corner's speed, at most its `exit_speed`.
+        """
+        offset = leg.target - place
+        distance = abs(offset) + TINY
+        direction = offset / distance
+        corner = self.passing_speed(leg.radius, (direction * leg.onward.conjugate()).real)
+        passing = min(corner, leg.exit_speed)
+        slowing = self.stopping_speed(distance, passing)
+        allowed, speed = min(leg.speed, slowing), abs(velocity)
+        heading = (velocity * direction.conjugate()).real / (speed + TINY)
+        if heading >= _ALIGNED or speed <= _MOVING or distance <= leg.radius:
+            return direction, allowed, allowed
+        rest = offset * leg.along.conjugate()
+        if rest.real > 0:
+            reach = max(leg.radius, _LOOKAHEAD)
+            aim = complex(sqrt(max(reach * reach - rest.imag * rest.imag, 0.0)), rest.imag)
+            direction = unit(aim * leg.along)
+        return direction, min(allowed, remembered), remembered
 
-def legs(limits: Px4Limits, path: FlightPath) -> list[GuidedLeg]:
-    """Return the legs of `path`.
+    def climb_setpoint(
+        self, leg: GuidedLeg, distance: float, height: float, speed: float
+    ) -> tuple[float, float]:
+        """Return the horizontal speed and the vertical velocity asked for, m/s.
 
-    Only the waypoint after the target is looked at: the aircraft must be able to stop there, and it
-    stops at the target if there is none, if it is told to hold, or if the next waypoint lies within
-    the acceptance radius. It goes on climbing there if the next leg does.
-    """
-    speeds = np.where(path.speeds > 0, path.speeds, limits.cruise_speed)
-    speeds = np.minimum(speeds, limits.max_speed)
-    radii = np.where(path.radii > 0, path.radii, limits.acceptance_radius)[1:]
-    radii = np.maximum(radii, NEAREST)
-    places, heights = path.points[:, 0] + 1j * path.points[:, 1], path.points[:, 2]
-    moves, rises = np.append(np.diff(places), 0j), np.append(np.diff(heights), 0.0)
-    following, holding = np.abs(moves[1:]), path.holds[1:] > 0
-    ahead = np.array([limits.stopping_speed(each) for each in following.tolist()])
-    passable = (following > 1e-3) & (following >= radii) & ~holding
-    climbs_on = (rises[:-1] * rises[1:] > 0) & ~holding
-    climbs = np.where(rises[:-1] > 0, limits.climb_speed, limits.descent_speed)
-    ways = np.array([unit(move) for move in moves.tolist()])
-    where = places[:-1], places[1:], heights[1:], ways[:-1], ways[1:]
-    exits = np.minimum(ahead, speeds) * passable, climbs * climbs_on
-    how = speeds, radii, np.maximum(path.holds[1:], 0.0), *exits
-    return [GuidedLeg(*each) for each in zip(*(x.tolist() for x in (*where, *how)), strict=True)]
-
-
-def headed(limits: Px4Limits, leg: GuidedLeg, place: complex) -> GuidedLeg:
-    """Return the leg that PX4 makes of `leg` for an aircraft at `place`, m.
-
-    It heads for the leg's end; from behind its beginning and farther from there than the radius
-    first for the beginning, from farther beside it for its nearest point. So an aircraft that
-    enters a leg far from it, for the waypoint before was accepted from afar and this one has a
-    small radius, first flies to that waypoint. The leg that it makes begins at the aircraft; on a
-    detour it passes towards the end, and nothing is known of what follows. (FlightTaskAuto)
-    """
-    way = (place - leg.origin) * leg.along.conjugate()
-    if not leg.along:
-        return leg
-    if way.real > abs(leg.target - leg.origin):
-        return replace(leg, along=unit(leg.target - place))
-    if way.real < 0 and abs(way) > leg.radius:
-        target = leg.origin
-    elif abs(way.imag) > leg.radius:
-        target = leg.origin + way.real * leg.along
-    else:
-        return leg
-    following, exit_speed = abs(leg.target - target), 0.0
-    if following >= leg.radius:
-        exit_speed = min(limits.stopping_speed(following), leg.speed)
-    along = unit(target - place)
-    return replace(leg, target=target, along=along, onward=leg.along, exit_speed=exit_speed)
-
-
-def level_setpoint(
-    limits: Px4Limits, leg: GuidedLeg, place: complex, velocity: complex, remembered: float
-) -> tuple[complex, float, float]:
-    """Return the unit direction and the speed, m/s, asked for, and the speed to remember for turns.
-
-    `place` m and `velocity` m/s are the trajectory's. The speed is the least of the command, what
-    can be slowed to the passing speed at the target in time, and in a turn what was allowed before
-    it. The direction is to the target, in a turn to a point of the leg max(R, 5 m) away. The target
-    is passed with a corner's speed, at most the leg's `exit_speed`.
-    """
-    offset = leg.target - place
-    distance = abs(offset) + TINY
-    direction = offset / distance
-    corner = corner_speed(limits, leg.radius, (direction * leg.onward.conjugate()).real)
-    passing = min(corner, leg.exit_speed)
-    slowing = limits.stopping_speed(distance, passing)
-    allowed, speed = min(leg.speed, slowing), abs(velocity)
-    heading = (velocity * direction.conjugate()).real / (speed + TINY)
-    if heading >= _ALIGNED or speed <= _MOVING or distance <= leg.radius:
-        return direction, allowed, allowed
-    rest = offset * leg.along.conjugate()
-    if rest.real > 0:
-        reach = max(leg.radius, _LOOKAHEAD)
-        aim = complex(sqrt(max(reach * reach - rest.imag * rest.imag, 0.0)), rest.imag)
-        direction = unit(aim * leg.along)
-    return direction, min(allowed, remembered), remembered
-
-
-def climb_setpoint(
-    limits: Px4Limits, leg: GuidedLeg, distance: float, height: float, speed: float
-) -> tuple[float, float]:
-    """Return the horizontal speed and the vertical velocity asked for, m/s.
-
-    The target is `distance` m away, `speed` m/s is asked for without regard to climbing. The slower
-    of the two directions holds up the other, for a straight line to the target.
-    """
-    rise = leg.height - height
-    fastest, acceleration = limits.vertical(rise)
-    left, distance = abs(rise) + TINY, distance + TINY
-    climb = min(fastest, limits.stopping_speed(left, leg.exit_climb, acceleration))
-    vertical = min(climb, max(speed, _SLOW) * left / distance)
-    speed = min(speed, max(climb, _SLOW) * distance / left)
-    return speed, copysign(vertical, rise)
+        The target is `distance` m away, `speed` m/s is asked for without regard to climbing. The
+        slower of the two directions holds up the other, for a straight line to the target.
+        """
+        rise = leg.height - height
+        fastest, acceleration = self.vertical(rise)
+        left, distance = abs(rise) + TINY, distance + TINY
+        climb = min(fastest, self.stopping_speed(left, leg.exit_climb, acceleration))
+        vertical = min(climb, max(speed, _SLOW) * left / distance)
+        speed = min(speed, max(climb, _SLOW) * distance / left)
+        return speed, copysign(vertical, rise)
 
 
 class Axis(NamedTuple):
