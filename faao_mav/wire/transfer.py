@@ -35,6 +35,10 @@ TENTATIVE = frozenset({MavResult.ERROR, MavResult.DENIED})
 """Results that PX4 and ArduPilot also give to late packets of an earlier transfer: they count when
 nothing else is said."""
 
+_OF_UPLOADS = TENTATIVE | {MavResult.INVALID_SEQUENCE, MavResult.OPERATION_CANCELLED}
+"""Results that may be about an upload while a list is read: a late item of it, or a late copy of
+its announcement, for whose items ArduPilot waits 8 s until it says that it has given up."""
+
 _OPENING = -1  # The question that opens a transfer, where the others are the numbers of items.
 
 _TEXTS = 5  # The number of status texts that are kept, the last ones. Chosen.
@@ -296,8 +300,8 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
                     count, number = told.count, told.opaque_id
                 case MissionItemInt(seq=seq, item=item) if exchange.answer(seq):
                     items[seq] = item
-                case MissionAck(type=result) if result in {*TENTATIVE, MavResult.INVALID_SEQUENCE}:
-                    exchange.doubt(result)  # which may be about a late item of an upload
+                case MissionAck(type=result) if result in _OF_UPLOADS:
+                    exchange.doubt(result)
                     continue
                 case MissionAck(type=result) if result != MavResult.ACCEPTED:
                     return exchange.end("refused", result)

@@ -34,7 +34,7 @@ from faao_mav.wire.messages import (
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
-from faao_mav.wire.transfer import TENTATIVE, Peer, send_list
+from faao_mav.wire.transfer import TENTATIVE, Peer, read_list, send_list
 from faao_mav.wire.wire_items import wire_items
 
 MISSION, FENCES = MissionType.MISSION, MissionType.FENCE
@@ -143,6 +143,21 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind: Mo
             assert vehicle_holds(mock, ours)
         else:
             assert report.verdict in ("refused", "different", "unread")
+
+
+def test_a_late_copy_of_an_announcement_ends_no_download() -> None:
+    """ArduPilot waits 8 s for items then, refuses downloads meanwhile, and says it has given up."""
+    rows = wire_items(a_mission(6, fence=FENCE), FENCES, vehicle_of("ardupilot"))
+    copy = Envelope(GROUND_STATION, MissionCount(VEHICLE, FENCES, len(rows)))
+    for late in (0.0, 0.15, 0.25):
+        mock = mock_of("ardupilot")
+        mock.lists.replace(FENCES, rows)
+        script: Any = Script(read_list(peer_of("ardupilot"), FENCES))
+        client, vehicle = Station(script, GROUND_STATION), Station(mock, VEHICLE)
+        events = [(late, lambda now, mock=mock: mock.on(copy, now))]
+        took = simulate(client, vehicle, Faults(latency=0.05), events=events)
+        assert (script.outcome.verdict, script.outcome.found) == ("accepted", rows)
+        assert took < 20
 
 
 def test_what_a_vehicle_stores_otherwise_is_found_out_and_sent_again() -> None:
