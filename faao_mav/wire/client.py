@@ -284,6 +284,9 @@ class Session(WireLink):
 
     def why_silent(self) -> str:
         """Return why the vehicle may never answer, in words; "" where nothing hints at it."""
+        if self.strangers:
+            origins = " and ".join(sorted(self.strangers))
+            return f"; packets in its name come from {origins}: begin again if it is there now"
         if self._signing is None and "signed" in self.codec.heard:
             return "; it signs its packets, and may want them signed: --signing-key"
         family = self.found.family

@@ -194,6 +194,29 @@ def test_what_comes_later_from_elsewhere_does_not_count(
     assert counts == 1  # of what it was asked to give, by one vehicle
 
 
+@pytest.mark.parametrize("moment", ["uploading", "reading"])
+def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
+    """A vehicle whose address changes in the middle is one that says nothing more.
+
+    A real ArduCopter whose power went while its list was read back came back at another port.
+    """
+    vehicles, notes = {HERE: a_mock(rate=0.0)}, list[str]()
+    in_the_air(monkeypatch, vehicles)
+
+    def observe(what: str, done: int, _: int) -> None:
+        if what.startswith(moment) and done >= 2 and HERE in vehicles:
+            vehicles[ELSEWHERE] = vehicles.pop(HERE)
+
+    hurry(monkeypatch)
+    monkeypatch.setattr("faao_mav.wire.jobs.ATTEMPTS", 2)
+    report = upload(a_mission(60), "udpin:0.0.0.0:1", observe=observe, note=notes.append)
+    assert [part.verdict for part in report.parts] == ["silent"]
+    assert ELSEWHERE in notes[0]
+    assert "If the vehicle's address has changed, begin again" in notes[0]
+    told = f"in its name come from {ELSEWHERE}: begin again if it is there now"
+    assert told in report.problems[0]
+
+
 # ---- who speaks
 
 
