@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from faao_mav.arrays import Integers, Real
+from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.errors import InputError
 from faao_mav.radio.gain import PathGain
 from faao_mav.vector import lengths
@@ -27,8 +27,12 @@ SPREAD_OF_NO_LAW = 10.0
 _PAPER = (False, 0)
 """The law d^-2 of the paper: its exponent is given, it has no terms of the elevation."""
 
-_ROBUST = 2.5
-"""Residuals beyond so many of their spreads count by their size, not its square (Huber)."""
+_ROBUST, _TURNS = 2.5, 8
+"""Residuals beyond so many of their spreads count by their size, not its square (Huber); how often
+the least squares are weighted anew."""
+
+_EXACT, _DEPENDENT = 1e-9, 1e-12
+"""The least spread, dB, and the least share of the greatest eigenvalue that is told from none."""
 
 _TURN, _LEAST, _MOST_LEGS = math.radians(45.0), 10, 100
 """A leg ends where its course has turned by so much, after so many means, or after so many as make
@@ -40,15 +44,17 @@ _PACE = 1.0
 _APART = 10.0
 """Metres between heights that are left out one by one. Chosen: twice what a copter holds."""
 
-_SWING = 40.0
-"""dB by which the terms of the elevation may differ from the horizon to the zenith. Chosen: deeper
-nulls of antennas are no polynomial's, and beyond what was flown one may do anything."""
+_SINES, _SWING = np.linspace(0.0, 1.0, 101)[:, None], 40.0
+"""Sines from the horizon to the zenith, and dB by which the terms of the elevation may differ
+between them. Chosen: deeper nulls of antennas are no polynomial's, and beyond what was flown one
+may do anything."""
 
 _PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
-_LAGS = np.arange(0.0, 310.0, 10.0)
-"""Bounds, m, of the distances between two places at which residuals are compared. Chosen."""
+_LAGS, _LENGTHS = np.arange(0.0, 310.0, 10.0), np.geomspace(1.0, 1000.0, 1000)
+"""Bounds, m, of the distances between two places at which residuals are compared, and the lengths
+of correlation that are tried. Chosen."""
 
 _MOST_PAIRED = 2000
 """Means of a flight that are compared with each other at most, for time and memory. Chosen."""
@@ -83,14 +89,11 @@ class Samples:
         sound = np.isfinite(self.t) & np.isfinite(self.level) & np.isfinite(self.place).all(axis=1)
         sound &= up > 0.0
         sound &= up > (0.5 * np.median(up[sound]) if sound.any() else 0.0)
-        t, place, power = self.t[sound], self.place[sound], 10.0 ** (self.level[sound] / 10.0)
-        _, group, count = np.unique(np.floor(t / seconds), return_inverse=True, return_counts=True)
-
-        def mean(x: Real) -> Real:
-            return np.asarray(np.bincount(group, x) / count)
-
-        places = np.stack([mean(x) for x in place.T], axis=1)
-        return Samples(mean(t), places, 10.0 * np.log10(mean(power)), self.source)
+        rows = np.column_stack([self.t, self.place, 10.0 ** (self.level / 10.0)])[sound]
+        group = np.unique(np.floor(rows[:, 0] / seconds), return_inverse=True)[1]
+        sums = np.stack([np.bincount(group, x) for x in rows.T], axis=1)
+        t, *place, power = (sums / np.bincount(group)[:, None]).T
+        return Samples(t, np.stack(place, axis=1), 10.0 * np.log10(power), self.source)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,31 +199,30 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     heights = _heights(place[:, 2], legs)
     parts = [part for part in (legs, heights) if part.max() > 0]
 
-    def errors(law: tuple[bool, int]) -> list[float]:
-        A, y = _linear(place, level, *law)
-        return [_rms(_left_out(A, y, part)) for part in parts]
+    def fitted(free: bool, terms: int) -> tuple[Real, Real, Real, list[float]]:
+        """Return A, y and c of a law, and its rms errors, dB, at what is left out."""
+        A, y = _linear(place, level, free, terms)
+        (c,) = _robust(A, y, np.ones((1, len(y)), dtype=np.bool_))
+        told = [np.sum(A * _without(A, y, part)[part], axis=1) for part in parts]
+        return A, y, c, [_rms(y - each) for each in told or [A @ c]]
 
-    best, paper = _PAPER, errors(_PAPER)
-    spread = paper
-    for law in sorted(product((False, True), range(TERMS + 1)), key=lambda law: sum(law)):
-        if parts and law != _PAPER and not _wild(*_linear(place, level, *law), law[1]):
-            tried = errors(law)
-            if np.mean(tried) < (1.0 - _PAYS) * np.mean(spread):
-                best, spread = law, tried
-    free, terms = best
-    A, y = _linear(place, level, free, terms)
-    c = _robust(A, y)
-    residual = y - A @ c
+    laws = sorted(product((False, True), range(TERMS + 1)), key=sum) if parts else [_PAPER]
+    tried, best = {law: fitted(*law) for law in laws}, _PAPER
+    for (free, terms), (_, _, c, spread) in tried.items():
+        pays = np.mean(spread) < (1.0 - _PAYS) * np.mean(tried[best][-1])
+        if pays and np.ptp(_SINES ** np.arange(1, terms + 1) @ c[len(c) - terms :]) <= _SWING:
+            best = free, terms
+    (free, terms), (A, y, c, spread) = best, tried[best]
     error, error_of_gain = _jackknife(A, y, legs)
     return LinkFit(
         level=float(c[0]),
         exponent=float(c[1]) if free else 2.0,
-        elevation=tuple(map(float, c[len(c) - terms :])),
-        errors=(float(error[0]), float(error[1]) if free else 0.0, *error[len(c) - terms :]),
+        elevation=tuple(c[len(c) - terms :].tolist()),
+        errors=(error[0], error[1] if free else 0.0, *error[len(c) - terms :]),
         error=error_of_gain,
-        spread=spread[-1] if spread else _rms(residual),
-        paper_spread=paper[-1] if paper else _rms(residual),
-        correlation=_correlation(means, residual),
+        spread=spread[-1],
+        paper_spread=tried[_PAPER][-1][-1],
+        correlation=_correlation(means, y - A @ c),
         legs=int(legs.max()) + 1,
         heights=int(heights.max()) + 1,
         flights=means,
@@ -235,43 +237,37 @@ def _linear(place: Real, level: Real, free: bool, terms: int) -> tuple[Real, Rea
     return np.stack(columns, axis=1), level if free else level - 2.0 * slope
 
 
-def _robust(A: Real, y: Real) -> Real:
-    """Return the c (m,) for which A c is nearest to y by Huber's measure, reweighted in turn."""
-    weight = np.ones_like(y)
-    for _ in range(20):
-        root = np.sqrt(weight)
-        c = np.asarray(np.linalg.lstsq(A * root[:, None], y * root, rcond=None)[0])
-        away = np.abs(y - A @ c)
-        spread = 1.4826 * float(np.median(away))
-        if spread == 0.0:
-            break
-        weight = np.minimum(1.0, _ROBUST * spread / np.maximum(away, spread))
+def _robust(A: Real, y: Real, kept: Flags) -> Real:
+    """Return the c (p, m) for which A c is nearest to those of y that are `kept` (p, k).
+
+    By Huber's measure: least squares, reweighted in turn.
+    """
+    products = (A[:, :, None] * A[:, None]).reshape(len(A), -1)
+    weight = kept.astype(np.float64)
+    for _ in range(_TURNS):
+        normal = (weight @ products).reshape(-1, A.shape[1], A.shape[1])
+        inverse = np.linalg.pinv(normal, rcond=_DEPENDENT, hermitian=True)
+        c = (inverse @ ((weight * y) @ A)[:, :, None])[:, :, 0]
+        away = np.abs(y - c @ A.T)
+        middle = np.nanmedian(np.where(kept, away, np.nan), axis=1, keepdims=True)
+        near = _ROBUST * np.maximum(1.4826 * middle, _EXACT)
+        weight = np.where(kept, np.minimum(1.0, near / np.maximum(away, near)), 0.0)
     return c
 
 
-def _left_out(A: Real, y: Real, part: Integers) -> Real:
-    """Return the errors (k,) of a fit where each `part` (k,) in turn was left out of it."""
-    error = np.empty_like(y)
-    for number in range(int(part.max()) + 1):
-        out = part == number
-        error[out] = y[out] - A[out] @ _robust(A[~out], y[~out])
-    return error
+def _without(A: Real, y: Real, part: Integers) -> Real:
+    """Return the c (p, m) of fits from which each `part` (k,) in turn is left out."""
+    return _robust(A, y, part != np.arange(part.max() + 1)[:, None])
 
 
-def _jackknife(A: Real, y: Real, legs: Integers) -> tuple[Real, float]:
-    """Return the standard errors of c (m,) and of A c by leaving out legs; infinite of one leg."""
+def _jackknife(A: Real, y: Real, legs: Integers) -> tuple[list[float], float]:
+    """Return the standard errors of c and of A c by leaving out legs; infinite of one leg."""
     count = int(legs.max()) + 1
     if count == 1:
-        return np.full(A.shape[1], np.inf), math.inf
-    without = np.array([_robust(A[legs != leg], y[legs != leg]) for leg in range(count)])
+        return [math.inf] * A.shape[1], math.inf
+    without = _without(A, y, legs)
     away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
-    return np.sqrt(np.sum(away**2, axis=0)), _rms(np.linalg.norm(A @ away.T, axis=1))
-
-
-def _wild(A: Real, y: Real, terms: int) -> bool:
-    """Whether the fitted terms of the elevation go beyond what antennas do, where none flew."""
-    s = np.linspace(0.0, 1.0, 101)[:, None] ** np.arange(1, terms + 1)
-    return float(np.ptp(s @ _robust(A, y)[A.shape[1] - terms :])) > _SWING
+    return np.linalg.norm(away, axis=0).tolist(), _rms(np.linalg.norm(A @ away.T, axis=1))
 
 
 def legs_of(means: Sequence[Samples]) -> Integers:
@@ -320,16 +316,10 @@ def _correlation(means: Sequence[Samples], residual: Real) -> float:
     power = float(np.mean(residual**2))
     if power == 0.0:
         return 0.0
-    from scipy.optimize import minimize_scalar  # 0.2 s, for who fits alone
-
-    middle, found = _LAGS[:-1] + 5.0, pairs > 0
-    correlation = total[found] / pairs[found] / power
-
-    def apart(log: float) -> float:
-        model = np.exp(-middle[found] * math.exp(-log))
-        return float(np.sum(pairs[found] * (correlation - model) ** 2))
-
-    return math.exp(float(minimize_scalar(apart, bounds=(0.0, 7.0), method="bounded").x))
+    found, L = pairs > 0, _LENGTHS[:, None]
+    model = np.exp(-(_LAGS[:-1] + 5.0)[found] / L)
+    apart = pairs[found] * (total[found] / pairs[found] / power - model) ** 2
+    return float(_LENGTHS[apart.sum(axis=1).argmin()])
 
 
 def _rms(x: Real) -> float:
