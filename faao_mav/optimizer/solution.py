@@ -12,12 +12,11 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import InputError, quote
-from faao_mav.files import write_whole
+from faao_mav.files import read_archive, write_whole
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.power import JOULES_PER_WH
-from faao_mav.radio.archive import read_archive
 from faao_mav.radio.relay import Relayed
 
 if TYPE_CHECKING:
@@ -356,7 +355,7 @@ def load_solution(path: str | Path) -> Solution:
     from pydantic import TypeAdapter, ValidationError
 
     required = (*_TEXTS, "converged", *_ARRAYS)
-    found = read_archive(path, (*required, *_OPTIONAL))
+    found = read_archive(path, (*required, *_OPTIONAL), "a result of faao-mission --save")
     for name in required:
         if name not in found:
             raise InputError(f"{path}: not a result of faao-mission --save: {name} is missing")

@@ -16,8 +16,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.gain_map import GainMap, Grid, filled
-from faao_mav.radio.map_file import MAX_VALUES
-from faao_mav.radio.raster import Raster, read_raster
+from faao_mav.radio.map_file import MAX_VALUES, Raster, read_raster
 
 _LIGHT = 299_792_458.0
 """The speed of light, m/s."""

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from conftest import MakePlan, contents
 
+from faao_mav import files
 from faao_mav.errors import InputError
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import SATURATED, price, saturation
 from faao_mav.optimizer.solution import Solution, load_solution, save_solution
-from faao_mav.radio import archive
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +135,7 @@ def test_an_archive_that_unpacks_to_any_size_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int, told: str
 ) -> None:
     """What is unpacked before that is in memory once: 400 MB at most."""
-    monkeypatch.setattr(archive, "MAX_BYTES", 10_000_000)
+    monkeypatch.setattr(files, "MAX_BYTES", 10_000_000)
     path = tmp_path / "result.npz"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("plan.npy", bytes(size))

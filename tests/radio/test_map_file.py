@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from faao_mav import files
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.radio import archive
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.map_file import WORD, map_archive, map_of_word, map_word, read_map
 
@@ -167,7 +167,7 @@ def test_files_that_are_no_archive_or_of_any_size_are_refused(
             read_map(tmp_path / name)
     with pytest.raises(InputError, match=r"none\.npz: cannot be read"):
         read_map(tmp_path / "none.npz")
-    monkeypatch.setattr(archive, "MAX_BYTES", 1_000_000)
+    monkeypatch.setattr(files, "MAX_BYTES", 1_000_000)
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as packed:
         packed.writestr("gain_db.npy", bytes(2_000_000))
     with pytest.raises(InputError, match=r"bomb\.npz: more than 1,000,000 bytes"):

@@ -9,7 +9,7 @@ from scipy.special import fresnel
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.radio.raster import read_raster
+from faao_mav.radio.map_file import read_raster
 from faao_mav.radio.terrain import (
     diffraction_loss,
     knife_edge_loss,
