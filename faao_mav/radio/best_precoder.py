@@ -3,14 +3,21 @@
 The power limit is always active, and P_B(n) and P_U(n) of (14) separate: every slot of every link
 is a problem of its own. With H = U S V^H and P = V Q the rate of one draw depends on S Q alone, so
 that the best rate is a function of the singular values S. One P for many draws (statistical CSI)
-has no such reduction.
+has no such reduction; what P sends outside the directions V that they respond to is lost power.
 
 For the cutoff rate, (7) or (8), the objective is F = ln mean_s δ_s with δ_s = N ln(rho) - R_0(H_s,
 P) [nats] and s the draws. Unlike R_0, F has a non-zero gradient at any SNR. For the mutual
 information, (5) or (6), it is F = -mean_s I(H_s, P), whose gradient -2 H^H H P E / (σ² ln 2) has
 the error E of the best estimate of what is sent. Source: Palomar and Verdu, "Gradient of mutual
 information in linear vector Gaussian channels", IEEE Trans. Inf. Theory 52 (2006).
+
+Neither is convex in Q. BFGS steps over ||Q||_F = 1 lead from several starts to optima of which the
+best are kept: first for the cutoff rate; then for the mutual information, and where draws are
+known, from these results and those of channels of similar gain.
 """
+
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,15 +25,6 @@ from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
 from faao_mav.radio.constellation import coordinates, difference_classes, outer
 from faao_mav.radio.mutual_information import NODES, mutual_information
 from faao_mav.radio.precoder import bpsk_two_antennas, check_positive, with_power
-from faao_mav.radio.precoder_search import (
-    Objective,
-    best_of,
-    exchanged,
-    minimise,
-    neighbours,
-    starting_points,
-    unit,
-)
 from faao_mav.radio.rate import ClassSum, Measure, class_sum
 
 _CHUNK = 4_000_000
@@ -54,6 +52,18 @@ many results are improved with all noises. Chosen."""
 
 _COARSE, _FINE = 1e-4, 1e-7
 """Tolerances, as a relative power: that which tells starts apart, and the last. Chosen."""
+
+_NEIGHBOURS = (-9, -5, -3, -2, -1, 1, 2, 3, 5, 9)
+"""The channels, counted in the order of gains, whose optima a channel tries as well. Chosen."""
+
+_STEPS = 120  # steps at most
+_FIRST, _LONGEST = 0.2, 0.7  # the first and the longest step, radians on the sphere ||Q||_F = 1
+_SURE = 1e-4  # part of the predicted fall of F with which a step is taken
+_LEAST_REACH = 1e-6  # part of a step below which a refusal is due to rounding
+
+Objective: TypeAlias = Callable[[Integers, Complex], tuple[Real, Complex]]
+"""F (k,) and its gradient ∂F/∂Re Q + j ∂F/∂Im Q (k, q, N), of the channels with the given indices
+(k,) at the points Q (k, q, N), ||Q||_F = 1."""
 
 
 def has_closed_form(modulation: str, antennas: int) -> bool:
@@ -125,45 +135,33 @@ def _searched(A: Complex, modulation: str, measure: Measure, start: Complex | No
     _, gains, Vh = np.linalg.svd(A.reshape(b, S * receive, N), full_matrices=False)
     V = Vh.conj().mT
     modes = A @ V[:, None]
-    Q = None if start is None else unit(Vh @ start)
-    if measure == "cutoff":
-        Q = _best_cutoff(modes, gains, modulation, N, Q)[0]
-    else:
-        objective = _information_objective(modes, modulation, NODES)
-        if Q is None:
-            # The optimum changes its kind at another SNR than that of the cutoff rate: those of
-            # stronger and weaker channels are starts too.
-            found = _best_cutoff(modes, gains, modulation, N, None)
-            starts = np.concatenate([found, found[0, neighbours(gains[:, 0])]])
-            few = _information_objective(modes, modulation, _FEW_NODES)
-            starts = best_of(few, objective, starts, _KEPT, _COARSE)
-            Q = best_of(objective, objective, starts, 1, _COARSE)[0]
-        Q, _ = minimise(objective, Q, _FINE)
+    sums = class_sum(difference_classes(modulation, N))
+    starts = starting_points(gains, N) if start is None else unit(Vh @ start)[None]
+    G = _levelled(sums, modes.conj().mT @ modes / 4, starts)
+    cutoff = last = _cutoff_objective(sums, G)
+    rounds = [(cutoff, cutoff)] if S == 1 < b else []
+    if measure == "mutual_information":
+        last = _information_objective(modes, modulation, NODES)
+        rounds.append((_information_objective(modes, modulation, _FEW_NODES), last))
+    if start is None:
+        starts = _kept(_cutoff_objective(sums, G[:, :: max(1, S // _DRAWS)]), cutoff, starts)
+        # In the basis of the modes channels of equal singular values have equal optima, and those
+        # of the mutual information change their kind at other SNRs than those of the cutoff rate.
+        near = neighbours(gains[:, 0])
+        for few, objective in rounds:
+            starts = _kept(few, objective, np.concatenate([starts, starts[0, near]]))
+    Q, _ = minimise(last, starts[0], _FINE)
     return np.where(gains[:, :1, None] > 0.0, V @ Q, np.eye(N) if start is None else start)
 
 
-def _best_cutoff(
-    modes: Complex, gains: Real, modulation: str, antennas: int, start: Complex | None
-) -> Complex:
-    """Return the optima found for the modes (b, S, N_r, q) of gains (b, q), the best first.
-
-    They are (k, b, q, N), and one from the `start` (b, q, N) where given.
-    """
-    b, S = modes.shape[:2]
-    sums = class_sum(difference_classes(modulation, antennas))
-    G = modes.conj().mT @ modes / 4
-    if start is not None:
-        Q, _ = minimise(_cutoff_objective(sums, _levelled(sums, G, start[None])), start, _FINE)
-        return Q[None]
-    starts = starting_points(gains, antennas, _RANDOM_STARTS)
-    G = _levelled(sums, G, starts)
-    draws = slice(None, None, max(1, S // _DRAWS))
-    objective, few = _cutoff_objective(sums, G), _cutoff_objective(sums, G[:, draws])
-    starts = best_of(few, objective, starts, _KEPT, _COARSE)
-    starts = best_of(objective, objective, starts, _KEPT, _COARSE)
-    starts[0], _ = minimise(objective, starts[0], _FINE)
-    if S == 1 and b > 1:
-        starts[0] = exchanged(objective, gains[:, 0], starts[0], _FINE)
+def _kept(few: Objective, objective: Objective, starts: Complex) -> Complex:
+    """Return the best that `starts` (k, b, q, N) lead to, first by an objective of few terms."""
+    for now in (few, objective):
+        found, _ = minimise(now, starts, _COARSE)
+        k, b = found.shape[:2]
+        F, _ = objective(np.tile(np.arange(b), k), found.reshape(k * b, *found.shape[2:]))
+        best = np.argsort(F.reshape(k, b), axis=0)[:_KEPT]
+        starts = found[best, np.arange(b)]
     return starts
 
 
@@ -209,3 +207,108 @@ def _information_objective(modes: Complex, modulation: str, nodes: int) -> Objec
         return -value.mean(axis=1), np.mean(gram[at] @ Q[:, None] @ errors, axis=1)
 
     return objective
+
+
+def starting_points(gains: Real, antennas: int) -> Complex:
+    """Return points to start from in the basis of the modes, (starts, b, q, N).
+
+    `gains` (b, q) are singular values, largest first: streams on separate modes, streams spread
+    over the modes, and random points, the same for every call.
+    """
+    b, q = gains.shape
+    stream = np.arange(antennas)
+    separate = np.eye(q, antennas, dtype=np.complex128)
+    spread = np.exp(2j * np.pi * np.outer(np.arange(q), stream) / antennas + 0.25j * np.pi * stream)
+    floor = np.maximum(gains, 0.03 * gains[:, :1])
+    equalised = (gains[:, :1] / np.where(floor > 0.0, floor, 1.0))[:, :, None]
+    structured = (separate, spread, equalised * spread)
+    starts = np.stack([unit(np.broadcast_to(M, (b, q, antennas))) for M in structured])
+    # Symmetric points are stationary without being optima: none is hit exactly.
+    parts = np.random.default_rng(7).standard_normal((2, 1 + _RANDOM_STARTS, 1, q, antennas))
+    points = unit(parts[0] + 1j * parts[1])
+    others = np.broadcast_to(points[1:], (_RANDOM_STARTS, b, q, antennas))
+    return unit(np.concatenate([starts + 0.05 * points[0], others]))
+
+
+def unit(Q: Complex) -> Complex:
+    """Return each matrix scaled to ||Q||_F = 1; zero matrices become a scaled identity."""
+    norm = np.linalg.norm(Q, axis=(-2, -1), keepdims=True)
+    filled = np.where(norm > 0.0, Q, np.eye(*Q.shape[-2:]))
+    return np.asarray(filled / np.linalg.norm(filled, axis=(-2, -1), keepdims=True))
+
+
+def neighbours(gain: Real) -> Integers:
+    """Return the channels (k, b) next to each of b in the order of their gains (b,)."""
+    order = np.argsort(gain, kind="stable")
+    rank = np.argsort(order, kind="stable")
+    return np.stack([order[np.clip(rank + k, 0, len(gain) - 1)] for k in _NEIGHBOURS])
+
+
+def minimise(objective: Objective, Q: Complex, tolerance: float) -> tuple[Complex, Real]:
+    """Return Q (..., b, q, N) and F (..., b) where BFGS steps lead on ||Q||_F = 1; F never rises.
+
+    A point is done once the fall of F that the next step predicts is below that of raising the
+    transmit power by the part `tolerance`: a measure that means the same at any SNR.
+
+    >>> G = np.diag([1.0, 4.0])
+    >>> def objective(at, Q):  # -||diag(1, 2) Q||²
+    ...     return -np.sum((Q.conj() * (G @ Q)).real, axis=(1, 2)), -2 * G @ Q
+    >>> Q, F = minimise(objective, np.ones((1, 2, 1)) + 0j, 1e-9)
+    >>> np.abs(Q[0]).round(3).ravel().tolist(), F.round(6).tolist()
+    ([0.0, 1.0], [-4.0])
+    """
+    *most, b, q, N = Q.shape
+    Q = unit(Q).reshape(-1, q, N)
+    going = np.arange(len(Q))
+    F, slope = objective(going % b, Q)
+    x, gradient, radial = _along(Q, slope)
+    length = np.linalg.norm(gradient, axis=1)
+    first = _FIRST / np.where(length > 0, length, 1.0)
+    inverse = np.eye(x.shape[1]) * first[:, None, None]
+    reach = np.ones(len(Q))
+    for number in range(_STEPS):
+        step = -(inverse[going] @ gradient[going, :, None])[:, :, 0]
+        predicted = -0.5 * np.sum(step * gradient[going], axis=1)
+        gains = predicted > -0.5 * tolerance * radial[going]
+        gains &= reach[going] > _LEAST_REACH
+        going, step, predicted = going[gains], step[gains], predicted[gains]
+        if not len(going):
+            break
+        step *= np.minimum(1.0, _LONGEST / np.linalg.norm(step, axis=1))[:, None]
+        trial = unit(_matrices(x[going] + reach[going, None] * step, q, N))
+        reached, slope = objective(going % b, trial)
+        new = _along(trial, slope)
+        _update(inverse, going, new[0] - x[going], new[1] - gradient[going], scale=number == 0)
+        better = reached < F[going] - _SURE * reach[going] * predicted
+        reach[going] = np.where(better, np.minimum(1.0, 4 * reach[going]), 0.25 * reach[going])
+        at = going[better]
+        x[at], gradient[at], radial[at], F[at] = (part[better] for part in (*new, reached))
+    return _matrices(x, q, N).reshape(*most, b, q, N), F.reshape(*most, b)
+
+
+def _along(Q: Complex, slope: Complex) -> tuple[Real, Real, Real]:
+    """Return [Re Q, Im Q] (b, m), the gradient along the sphere (b, m), and that outwards (b,)."""
+    x, gradient = (np.concatenate([M.real, M.imag], axis=1).reshape(len(M), -1) for M in (Q, slope))
+    radial = np.sum(x * gradient, axis=1)
+    return x, gradient - radial[:, None] * x, radial
+
+
+def _matrices(x: Real, q: int, N: int) -> Complex:
+    return (x[:, : q * N] + 1j * x[:, q * N :]).reshape(-1, q, N)
+
+
+def _update(inverse: Real, at: Integers, s: Real, y: Real, *, scale: bool) -> None:
+    """Correct the inverse Hessians of the points `at` by what steps s changed the gradients, y.
+
+    Those of the first step are begun with the size that it shows (`scale`). Where the gradient
+    falls along the step, nothing is learnt.
+    """
+    curvature, size = np.sum(s * y, axis=1), np.sum(y * y, axis=1)
+    bent = curvature > 1e-10 * np.sqrt(np.sum(s * s, axis=1) * size)
+    at, s, y, curvature, size = at[bent], s[bent], y[bent], curvature[bent], size[bent]
+    if scale:
+        inverse[at] = np.eye(s.shape[1]) * (curvature / size)[:, None, None]
+    By = (inverse[at] @ y[:, :, None])[:, :, 0]
+    both = (1 + np.sum(y * By, axis=1) / curvature)[:, None]
+    turn = s[:, :, None] * (0.5 * both * s - By)[:, None, :] / curvature[:, None, None]
+    inverse[at] += turn + turn.swapaxes(1, 2)
