@@ -8,39 +8,28 @@ the plan knows nothing; `silence`, a link that carries nothing for 8 s of the fl
 each: how it ended, the delivered rate over the planned one, and m rms from the plan at equal times.
 """
 
-import math
 import os
 import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 from unittest.mock import patch
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-
-from conftest import MISSIONS, edited
-from simulators import simulated
+from flown import serving
 
 from faao_mav import Result, plan_mission
 from faao_mav.fly.fly import FlightReport, fly_mission
 from faao_mav.fly.preflight import Flight
 from faao_mav.fly.watch import Watch
-from faao_mav.plan import parse_plan
+from faao_mav.plan import Wind
 from faao_mav.sim.faults import Faults, FaultyTransport
 from faao_mav.wire import link
-from faao_mav.wire.client import upload
 from faao_mav.wire.transport import open_transport
+from missions import plan_of
 
 SPEEDUP = 2
 BEGIN = 25.0
 """Seconds of the plan's clock after which the link breaks."""
-
-HOLDS = "COM_OBL_RC_ACT=5"
-"""What PX4 does without setpoints: Hold."""
-
-WINDS = {"ardupilot": (7.0, 225.0), "px4": (7.0, 225.0)}
-"""Speed, m/s, and where it comes from, degrees: against the middle of the flight."""
 
 OUTAGES = tuple((begin, begin + 2.0) for begin in range(15, 600, 20))
 FAULTS = {
@@ -48,7 +37,7 @@ FAULTS = {
     "loss 20 %": Faults(loss=0.2, seed=1),
     "outages": Faults(outages=OUTAGES, seed=1),
 }
-CASES = ("none", "wind", "silence", *FAULTS)
+AUTOPILOTS, CASES = ("ardupilot", "px4"), ("none", "wind", "silence", *FAULTS)
 
 
 class Disturbance:
@@ -83,33 +72,17 @@ class Disturbance:
 
 def flown(autopilots: Path, autopilot: str, result: Result, case: str) -> FlightReport:
     """Fly the plan of `result` by setpoints in a simulator."""
-    speed, origin = WINDS[autopilot] if case == "wind" else (0.0, 0.0)
+    # 7 m/s against the middle of the flight
+    wind = Wind(speed=7.0 if case == "wind" else 0.0, from_degrees=225.0)
     assert result.conversion is not None
     disturbance = Disturbance(case)
-    with tempfile.TemporaryDirectory() as where:
-        folder = Path(where)
-        if autopilot == "px4":
-            towards = math.radians(origin + 180)
-            east, north = speed * math.sin(towards), speed * math.cos(towards)
-            air = [f"--wind={east},{north}"] if speed else []
-            options = ["--speedup", str(SPEEDUP), "--params", f"SIH_KDV=0.2,{HOLDS}", *air]
-        else:
-            timed = [f"{name} {value}" for name, value in result.conversion.parameters.items()]
-            air = [f"SIM_WIND_SPD {speed}", f"SIM_WIND_DIR {origin}"] if speed else []
-            (folder / "own.parm").write_text("\n".join(["GUID_TIMEOUT 1", *timed, *air]))
-            defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{folder / 'own.parm'}"
-            options = ["--speedup", str(SPEEDUP), "--defaults", defaults]
-        kind = "px4" if autopilot == "px4" else "arducopter"
-        with simulated(autopilots, kind, folder, *options) as connection:
-            upload(result.conversion.mission, connection, wait=60)
-            with patch.object(link, "open_transport", disturbance.opened):
-                return fly_mission(
-                    Flight.planned(result.conversion, result.solution, streamed=True),
-                    connection,
-                    rate=10,
-                    wait=60,
-                    watching=disturbance,
-                )
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(autopilots, autopilot, result, Path(folder), SPEEDUP, wind) as connection,
+        patch.object(link, "open_transport", disturbance.opened),
+    ):
+        flight = Flight.planned(result.conversion, result.solution, streamed=True)
+        return fly_mission(flight, connection, rate=10, wait=60, watching=disturbance)
 
 
 def delivered(result: Result, report: FlightReport) -> str:
@@ -127,10 +100,8 @@ def delivered(result: Result, report: FlightReport) -> str:
 def main() -> None:
     """Print a row for each autopilot and case."""
     chosen, autopilots = sys.argv[1:], Path(os.environ["FAAO_AUTOPILOTS"])
-    for autopilot in [each for each in WINDS if each in chosen] or WINDS:
-        changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "flight.altitude": 30}
-        text = (MISSIONS / "copter_relay.yaml").read_text()
-        result = plan_mission(parse_plan(edited(text, changes)))
+    for autopilot in [each for each in AUTOPILOTS if each in chosen] or AUTOPILOTS:
+        result = plan_mission(plan_of({"flight.altitude": 30}, autopilot, "recommend"))
         for case in [each for each in CASES if each in chosen] or CASES:
             report = flown(autopilots, autopilot, result, case)
             print(f"{autopilot:<10}{case:<11}{delivered(result, report)}", flush=True)

@@ -3,8 +3,7 @@
     python benchmarks/drag_to_route.py [PLAN.yaml] [--drags 50]
 
 Each drag moves the user by some metres. What is timed, by the browser's clock, is from the mouse
-move to the next route that is drawn; and beside it, by the processor's, what a worker computes for
-such a drag: the rough answer, from the flight before.
+move to the next route that is drawn.
 """
 
 import argparse
@@ -13,14 +12,9 @@ import shutil
 import statistics
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
-
-from faao_mav.app.answers import rough
-from faao_mav.app.document import Document
-from faao_mav.plan import parse_plan
 
 PLAN = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
 COMMAND = Path(sys.executable).with_name("faao-mission")
@@ -55,19 +49,6 @@ def measure(page: Page, drags: int) -> list[float]:
     return times
 
 
-def computed(plan: Path, drags: int) -> list[float]:
-    """Return for each drag by 5 m the processor's milliseconds of its rough answer."""
-    document, key = Document.open(plan), ("radio", "ground_user", "position")
-    east, north = parse_plan(document.text, str(plan)).radio.ground_user.position
-    near, times = rough(document.text, str(plan), None).velocities, []
-    for k in range(drags):
-        document.put(key, [float(east) + 5.0 * (1 + k % 10), float(north)])
-        began = time.process_time()
-        near = rough(document.text, str(plan), near).velocities
-        times.append(1e3 * (time.process_time() - began))
-    return times
-
-
 def redrawn(page: Page) -> float:
     """Wait for the next route; return the milliseconds from the last mouse move to it."""
     page.wait_for_function("window.drawn", timeout=120_000)
@@ -93,14 +74,12 @@ def main() -> None:
             browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
             page = browser.new_page(viewport={"width": 1280, "height": 900})
             page.goto(found[0])
-            times = {"drag to route": measure(page, asked.drags)}
+            times = measure(page, asked.drags)
             browser.close()
     finally:
         server.terminate()
         server.wait()
-    times["rough answer"] = computed(asked.plan, asked.drags)
-    for name, each in times.items():
-        print(f"{name:<13}  median {statistics.median(each):.0f} ms, worst {max(each):.0f} ms")
+    print(f"median {statistics.median(times):.0f} ms, worst {max(times):.0f} ms")
 
 
 if __name__ == "__main__":

@@ -36,10 +36,10 @@ from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.preflight import Flight
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import Plan
+from faao_mav.plan import Plan, Wind
 from faao_mav.schedule.prediction import Prediction, price_flight
 from faao_mav.wire.client import upload
-from missions import PLANS, plan_of, random_changes
+from missions import PLANS, changes, plan_of, random_changes
 
 Changes = dict[str, Any]
 """Changes of a sample plan, by dotted keys."""
@@ -58,21 +58,12 @@ _OF_MISSIONS = ("copter_relay", "short", "slow", "two hovers, 200", "curved, 75"
 FLOWN: dict[str, Changes] = {
     name: changes for name, changes in PLANS.items() if name.startswith(_OF_MISSIONS)
 } | {
-    "brief, 80 s, 7 m/s": {
-        "flight.duration": 80,
-        "vehicle.max_speed": 7,
-        "radio.ground_user.position": [350, 200],
-    },
+    "brief, 80 s, 7 m/s": changes(80, 7, [0, 350], [350, 0], [350, 200], 100),
     "free ends, 90 s, 10 m/s": _FAST | _FREE,
     "the same, 45 degrees of lean": _FAST | _FREE | {"vehicle.parameters": {"ANGLE_MAX": 4500}},
     "gentle, 90 s, 10 m/s": _FAST | _FREE | {"vehicle.max_acceleration": 0.6},
-    "16-QAM, 240 s, 5 m/s": {
-        "flight.duration": 240,
-        "vehicle.max_speed": 5,
-        "vehicle.max_acceleration": 1.0,
-        "radio.modulation": "16qam",
-        "radio.ground_user.position": [400, 250],
-    },
+    "16-QAM, 240 s, 5 m/s": changes(240, 5, [0, 350], [350, 0], [400, 250], 100)
+    | {"vehicle.max_acceleration": 1.0, "radio.modulation": "16qam"},
 }
 """Plans for copters, as changes of `missions/copter_relay.yaml`."""
 
@@ -147,19 +138,24 @@ def streamed(autopilots: Path, autopilot: str, result: Result, folder: Path) -> 
 
 @contextmanager
 def serving(
-    autopilots: Path, autopilot: str, result: Result, folder: Path, speedup: int = 5
+    autopilots: Path,
+    autopilot: str,
+    result: Result,
+    folder: Path,
+    speedup: int = 5,
+    wind: Wind | None = None,
 ) -> Iterator[str]:
-    """Run a simulator in `folder`, in the plan's wind, that holds the mission of `result`.
+    """Run a simulator in `folder`, in the plan's wind or another, with the mission of `result`.
 
     It yields where it is heard, `speedup` times as fast as the world. The autopilot's own log stays
-    in `folder`.
+    in `folder`. Without setpoints PX4 goes into Hold.
     """
-    wind = result.solution.plan.site.wind
+    wind = wind or result.solution.plan.site.wind
     assert result.conversion is not None
     files, script = result.write(folder / "mission.waypoints"), autopilots / RUNNERS[autopilot][0]
     if autopilot == "px4":
         kind, options = "px4", in_wind(script, wind)
-        options += ["--params", "SIH_KDV=0.2", "--keep", str(folder / "px4")]
+        options += ["--params", "SIH_KDV=0.2,COM_OBL_RC_ACT=5", "--keep", str(folder / "px4")]
         options += ["--param-file", str(files[1])] if len(files) > 1 else []
     else:
         plans = result.solution.plan.vehicle.parameters

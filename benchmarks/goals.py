@@ -40,42 +40,38 @@ LESS_DB = 0.02
 TRIES = 10
 """Random ways that are tried for each start: of some no flight is found."""
 
-PLANE = {"cruise_w": 120, "at": 15, "mass": 2}
+PLANE = {"vehicle.power": {"cruise_w": 120, "at": 15, "mass": 2}}
+
+
+def least(what: str, rate: float) -> dict[str, Any]:
+    """Return the goal of the least of `what` with which a rate, bit/s/Hz, is delivered."""
+    return {"goal": {"rate": rate, "minimise": what}}
+
+
+def most_data(energy: float) -> dict[str, Any]:
+    """Return the goal of the most data that so many Wh deliver."""
+    return {"goal": {"maximise": "data", "energy_wh": energy}}
+
 
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "500 megabytes, 20 MHz": ("quickest_delivery", {}),
-    "2 bit/s/Hz, least duration": (
-        "copter_relay",
-        {"goal": {"rate": 2.0, "minimise": "duration"}},
-    ),
-    "2 bit/s/Hz, least power": ("copter_relay", {"goal": {"rate": 2.0, "minimise": "power"}}),
-    "1 bit/s/Hz, least power": ("copter_relay", {"goal": {"rate": 1.0, "minimise": "power"}}),
+    "2 bit/s/Hz, least duration": ("copter_relay", least("duration", 2.0)),
+    "2 bit/s/Hz, least power": ("copter_relay", least("power", 2.0)),
+    "1 bit/s/Hz, least power": ("copter_relay", least("power", 1.0)),
     "half duplex, least duration": (
         "copter_relay",
-        {"goal": {"rate": 1.3, "minimise": "duration"}, "radio.duplex": "half"},
+        least("duration", 1.3) | {"radio.duplex": "half"},
     ),
-    "fence, least duration": (
-        "fenced_relay",
-        {"goal": {"rate": 2.1, "minimise": "duration"}},
-    ),
+    "fence, least duration": ("fenced_relay", least("duration", 2.1)),
     "800 megabytes, least energy": (
         "battery",
         {"goal": {"deliver_mbytes": 800, "minimise": "energy"}},
     ),
-    "most data of 19 Wh": ("battery", {"goal": {"maximise": "data", "energy_wh": 19}}),
-    "plane, 1.2 bit/s/Hz, duration": (
-        "plane_relay",
-        {"goal": {"rate": 1.2, "minimise": "duration"}},
-    ),
-    "plane, 1 bit/s/Hz, power": ("plane_relay", {"goal": {"rate": 1.0, "minimise": "power"}}),
-    "plane, 1.2 bit/s/Hz, energy": (
-        "plane_relay",
-        {"goal": {"rate": 1.2, "minimise": "energy"}, "vehicle.power": PLANE},
-    ),
-    "plane, most data of 4.3 Wh": (
-        "plane_relay",
-        {"goal": {"maximise": "data", "energy_wh": 4.3}, "vehicle.power": PLANE},
-    ),
+    "most data of 19 Wh": ("battery", most_data(19)),
+    "plane, 1.2 bit/s/Hz, duration": ("plane_relay", least("duration", 1.2)),
+    "plane, 1 bit/s/Hz, power": ("plane_relay", least("power", 1.0)),
+    "plane, 1.2 bit/s/Hz, energy": ("plane_relay", least("energy", 1.2) | PLANE),
+    "plane, most data of 4.3 Wh": ("plane_relay", most_data(4.3) | PLANE),
 }
 
 
@@ -115,14 +111,9 @@ def from_random(problem: Problem, count: int) -> float:
             flight = sparing_starts(kin, {"": flight}, (*constraints_of(kin), *kept)).get("")
         if flight is not None:
             found = maximize(
-                kin,
-                field,
-                flight,
-                constraints=kept,
-                tolerance=1e-4,
-                max_iterations=300,
+                kin, field, flight, constraints=kept, tolerance=1e-4, max_iterations=300,
                 relay=problem.relay,
-            )
+            )  # fmt: skip
             reached.append(found.value)
         if len(reached) == count:
             break

@@ -13,17 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from faao_mav.radio.fit import LinkFit, Samples, fit_link
+from faao_mav.arrays import Real
+from faao_mav.radio.fit import Samples, fit_link
 from faao_mav.radio.kriging import kriged
 from faao_mav.radio.measured import read_measured
 
 
-def square_law(flights: list[Samples]) -> LinkFit:
-    """The fit of d^-2 with its level: what one leg of all that was measured gives."""
-    place = np.concatenate([each.place for each in flights])
-    level = np.concatenate([each.level for each in flights])
-    at = float(np.mean(level + 20 * np.log10(np.linalg.norm(place, axis=1))))
-    return LinkFit(at, 2.0, (), (), 0.0, 0.0, 0.0, 0.0, 1, 1, ())
+def spread_out(means: Samples) -> Real:
+    """The level that d^-2 has at 1 m by each of the means, dB."""
+    return np.asarray(means.level + 20 * np.log10(np.linalg.norm(means.place, axis=1)))
 
 
 def told(errors: Iterable[float]) -> str:
@@ -42,8 +40,9 @@ def main() -> None:
     for out, flight in enumerate(flights):
         others = flights[:out] + flights[out + 1 :]
         fit, seen = fit_link(others), flight.means(2.0)
-        plain = square_law([each.means(2.0) for each in others])
-        errors = [seen.level - law.gain_db(seen.place) for law in (fit, plain)]
+        square = [spread_out(each.means(2.0)) for each in (flight, *others)]
+        errors = [seen.level - fit.gain_db(seen.place)]
+        errors.append(square[0] - np.mean(np.concatenate(square[1:])))
         found, *_ = kriged(fit, station)
         above = found.at(float(np.median(seen.place[:, 2]))) if found else None
         errors.append(errors[0] - (above.value(*seen.place.T[:2]) if above else 0.0))

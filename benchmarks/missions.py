@@ -22,7 +22,7 @@ from faao_mav.schedule.prediction import price_flight
 SAMPLE = Path(__file__).parents[1] / "missions" / "copter_relay.yaml"
 
 
-def _changes(
+def changes(
     duration: float, speed: float, start: list[int], end: list[int], user: list[int], height: float
 ) -> dict[str, Any]:
     return {
@@ -37,14 +37,14 @@ def _changes(
 
 PLANS: dict[str, dict[str, Any]] = {
     "copter_relay, 120 s, 8 m/s": {},
-    "short, 60 s, 6 m/s": _changes(60, 6, [0, 200], [200, 0], [200, 200], 100),
-    "slow, 90 s, 4 m/s": _changes(90, 4, [0, 150], [150, 0], [250, 250], 100),
-    "two hovers, 200 s, 9 m/s": _changes(200, 9, [0, 350], [350, 0], [300, 300], 100)
+    "short, 60 s, 6 m/s": changes(60, 6, [0, 200], [200, 0], [200, 200], 100),
+    "slow, 90 s, 4 m/s": changes(90, 4, [0, 150], [150, 0], [250, 250], 100),
+    "two hovers, 200 s, 9 m/s": changes(200, 9, [0, 350], [350, 0], [300, 300], 100)
     | {"vehicle.max_acceleration": 2.0},
-    "two hovers, 300 s, 7 m/s": _changes(300, 7, [0, 350], [500, 0], [600, 500], 100),
-    "curved, 100 s, 7 m/s": _changes(100, 7, [0, 350], [350, 0], [350, 300], 60),
-    "curved, 75 s, 8 m/s": _changes(75, 8, [-50, 250], [250, -50], [300, 300], 50),
-    "curved, 150 s, 8 m/s": _changes(150, 8, [-200, 350], [350, -200], [400, 400], 60)
+    "two hovers, 300 s, 7 m/s": changes(300, 7, [0, 350], [500, 0], [600, 500], 100),
+    "curved, 100 s, 7 m/s": changes(100, 7, [0, 350], [350, 0], [350, 300], 60),
+    "curved, 75 s, 8 m/s": changes(75, 8, [-50, 250], [250, -50], [300, 300], 50),
+    "curved, 150 s, 8 m/s": changes(150, 8, [-200, 350], [350, -200], [400, 400], 60)
     | {"radio.relay.noise_dbm": -85, "radio.ground_user.noise_dbm": -85},
 }
 """Changes of the sample plan, by dotted keys."""
@@ -69,7 +69,7 @@ def random_changes(seed: int) -> dict[str, Any]:
     ends = ["free" if random.random() < 0.2 else "hover" for _ in range(2)]
     start, end, height = place(reach), place(reach), random.choice((40, 60, 80, 100, 120))
     acceleration = round(random.uniform(0.8, 2.5), 1)
-    return _changes(duration, speed, start, end, place(500.0), height) | {
+    return changes(duration, speed, start, end, place(500.0), height) | {
         "flight.start_velocity": ends[0],
         "flight.end_velocity": ends[1],
         "vehicle.max_acceleration": acceleration,

@@ -7,7 +7,8 @@ numbers c of every slot alone: with H = sqrt(g) H_r every exponent of (7), (8) i
 that one model with c as its parameter serves all starts and all precoders.
 """
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,11 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.fence_geometry import FenceGeometry
+from faao_mav.optimizer.interior.maximize import objective
+from faao_mav.optimizer.kinematics import LENGTH as METRES
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.starts import points_along, starts
 from faao_mav.plan import Plan, read_plan
@@ -35,6 +39,8 @@ EACH = {
 
 LENGTH = 100.0
 TOLERANCE = 1e-7
+PATIENCE = 60.0
+"""Processor seconds that the peer may take for one start where the relay has a queue."""
 ROUNDS, GAIN = 6, 1e-5
 """Alternation of IPOPT and best precoders: at most so many rounds, the least gain of R_avg."""
 
@@ -110,8 +116,10 @@ def _hurried(kin: Kinematics, stops: Sequence[Real]) -> Trajectory:
     return Trajectory(w, v, a)
 
 
-def curve(link: Link, rate: TableRate, number: int) -> Curve:
-    """The curve of `rate` over the logarithm of the path gain."""
+def at_distance(link: Link, rate: Any, number: int, w: Real) -> ClassRate | Curve:
+    """The curve of `rate` over the logarithm of the path gain, or the closed form at w."""
+    if not (isinstance(rate, TableRate) and rate.kind == "curve"):
+        return at_best(link, w)
     assert rate.still is not None
     grid = rate.table.spline.x - rate.still[0]
     spline = ca.interpolant(f"rate{number}", "bspline", [grid], rate.value(grid, 0 * grid))
@@ -230,27 +238,26 @@ class Model:
         )
         lower_w, upper_w = np.full((n, 2), -np.inf), np.full((n, 2), np.inf)
         lower_v, upper_v = lower_w.copy(), upper_w.copy()
-        for lower, upper, at, value in (
+        for least, most, at, value in (
             (lower_w, upper_w, 0, kin.start / LENGTH),
             (lower_w, upper_w, -1, kin.end / LENGTH),
             (lower_v, upper_v, 0, kin.start_velocity),
             (lower_v, upper_v, -1, kin.end_velocity),
         ):
             if value is not None:
-                lower[at] = upper[at] = value if lower is lower_w else value / speed
+                least[at] = most[at] = value if least is lower_w else value / speed
         free = np.full(2 * (n - 1) + 1, np.inf)
-        self.lower = np.concatenate([lower_w.ravel(), lower_v.ravel(), -free])
-        self.upper = np.concatenate([upper_w.ravel(), upper_v.ravel(), free])
+        lower = [lower_w.ravel(), lower_v.ravel(), -free]
+        upper = [upper_w.ravel(), upper_v.ravel(), free]
         if relay is not None:
             room = np.full(n, relay.buffer / kin.time_step)
             room[0] = 0
-            least = np.concatenate([np.zeros(3 * n), np.full(n, 0.0 if relay.half else 1.0)])
-            self.lower = np.concatenate([self.lower, least])
-            self.upper = np.concatenate([self.upper, np.full(2 * n, np.inf), room, np.ones(n)])
+            lower += [np.zeros(3 * n), np.full(n, 0.0 if relay.half else 1.0)]
+            upper += [np.full(2 * n, np.inf), room, np.ones(n)]
         if fence is not None:
             turns = np.full(len(fence.obstacles) * (n - 1), np.inf)
-            self.lower = np.concatenate([self.lower, -turns])
-            self.upper = np.concatenate([self.upper, turns])
+            lower, upper = [*lower, -turns], [*upper, turns]
+        self.lower, self.upper = np.concatenate(lower), np.concatenate(upper)
         options: dict[str, Any] = {
             "print_time": False,
             "ipopt": {
@@ -310,3 +317,23 @@ class Model:
             v * kin.max_speed,
             np.vstack([a * kin.max_acceleration, np.zeros(2)]),
         )
+
+
+def delivered(
+    problem: Problem, field: RateField, flights: Iterable[Trajectory], kept: float
+) -> tuple[list[float], list[float]]:
+    """Return what IPOPT delivers from each start, 0 beyond `kept` of a limit, and its seconds."""
+    kin, relay, fence = problem.kinematics, problem.relay, problem.fence
+    model, reached, seconds = None, [], []
+    for flight in flights:
+        began = time.process_time()
+        both = enumerate(zip(field.links, field.rates, strict=True))
+        rates = [at_distance(link, rate, k, flight.w) for k, (link, rate) in both]
+        model = model or Model(kin, rates, PATIENCE, relay, fence)
+        found = model.solve(rates, flight)
+        seconds.append(time.process_time() - began)
+        beyond = [*kin.residuals(found).values()]
+        beyond += [] if fence is None else [METRES * fence.excess(kin, found)]
+        sound = max(beyond) < kept
+        reached.append(objective(field.value(found.w.T), kin, relay) if sound else 0.0)
+    return reached, seconds

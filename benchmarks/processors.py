@@ -15,8 +15,10 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +44,21 @@ PROCESSORS = {
 """The environment in which the program takes this processor for another one."""
 
 
+def random_radio(
+    random: Random, place: Callable[[], list[int]], causal: bool, duplex: Callable[[], str]
+) -> dict[str, Any]:
+    """Return the radio of a plan: its stations by `place`, where the relay is causal a `duplex`."""
+    return {
+        "base_station": {"position": place(), "power_dbm": random.choice((8, 12, 20))},
+        "relay": {"power_dbm": random.choice((8, 12, 20)), "noise_dbm": -80},
+        "ground_user": {"position": place(), "noise_dbm": -80},
+        "modulation": random.choice(("bpsk", "qpsk")),
+        "causal": causal,
+        "duplex": duplex() if causal else "full",
+        "fading": random.choice(("ergodic", "none", "realization")),
+    }
+
+
 def random_plan(seed: int) -> str:
     """Return the YAML of a plan of which little is fixed: every fourth one is for a plane."""
     random, kind = Random(seed), seed % 4
@@ -53,34 +70,23 @@ def random_plan(seed: int) -> str:
     causal = random.random() < 0.5
     fastest = {"max_speed": random.choice((8, 10, 12)), "max_acceleration": random.choice((1.5, 3))}
     vehicle = {"max_speed": 22, "max_acceleration": 4, "min_speed": 14} if plane else fastest
+    named = {
+        "autopilot": "px4" if kind == 2 else "ardupilot",
+        "type": "plane" if plane else "copter",
+    }
     free = {"start_velocity": "free", "end_velocity": "free"} if plane else {}
-    return dump_yaml(
-        {
-            "site": {"origin": {"latitude": random.uniform(-60, 60), "longitude": 8.5}},
-            "vehicle": {
-                "autopilot": "px4" if kind == 2 else "ardupilot",
-                "type": "plane" if plane else "copter",
-                **vehicle,
-            },
-            "flight": {
-                "start": place(),
-                "end": place(),
-                "altitude": random.choice((60, 100)),
-                "duration": random.choice((80, 100, 120)),
-                "time_step": random.choice((0.25, 0.5)),
-                **free,
-            },
-            "radio": {
-                "base_station": {"position": place(), "power_dbm": random.choice((8, 12, 20))},
-                "relay": {"power_dbm": random.choice((8, 12, 20)), "noise_dbm": -80},
-                "ground_user": {"position": place(), "noise_dbm": -80},
-                "modulation": random.choice(("bpsk", "qpsk")),
-                "causal": causal,
-                "duplex": random.choice(("full", "half")) if causal else "full",
-                "fading": random.choice(("ergodic", "none", "realization")),
-            },
-        }
-    )
+    origin = {"latitude": random.uniform(-60, 60), "longitude": 8.5}
+    flight = {
+        "start": place(),
+        "end": place(),
+        "altitude": random.choice((60, 100)),
+        "duration": random.choice((80, 100, 120)),
+        "time_step": random.choice((0.25, 0.5)),
+        **free,
+    }
+    radio = random_radio(random, place, causal, lambda: random.choice(("full", "half")))
+    whole = {"site": {"origin": origin}, "vehicle": named | vehicle, "flight": flight}
+    return dump_yaml(whole | {"radio": radio})
 
 
 def planned(plan: Path, environment: dict[str, str]) -> tuple[bytes, float]:

@@ -11,13 +11,14 @@ its own, refused, and refused though IPOPT has a flight.
 import argparse
 import sys
 import time
-from dataclasses import dataclass
+from collections import Counter
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 from joblib import Parallel, delayed
+from processors import random_radio
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
@@ -54,53 +55,38 @@ def random_plan(seed: int) -> str:
     end = [*start] if random.random() < 0.25 else place()
     shortest = 1.2 * float(np.hypot(*np.subtract(end, start))) / fastest
     causal = random.random() < 0.75
-    return dump_yaml(
-        {
-            "site": {"origin": {"latitude": 47.0, "longitude": 8.5}},
-            "vehicle": {
-                "type": "plane",
-                "min_speed": least,
-                "max_speed": fastest,
-                "max_acceleration": random.choice((2, 3, 5)),
-            },
-            "flight": {
-                "start": start,
-                "end": end,
-                "altitude": random.choice((60, 100)),
-                "duration": max(random.choice((30, 60, 120, 180, 240)), round(shortest)),
-                "time_step": random.choice((0.2, 0.5, 1.0)),
-                "start_velocity": velocity(),
-                "end_velocity": velocity(),
-            },
-            "radio": {
-                "base_station": {"position": place(), "power_dbm": random.choice((8, 12, 20))},
-                "relay": {"power_dbm": random.choice((8, 12, 20)), "noise_dbm": -80},
-                "ground_user": {"position": place(), "noise_dbm": -80},
-                "modulation": random.choice(("bpsk", "qpsk")),
-                "causal": causal,
-                "duplex": "half" if causal and random.random() < 0.25 else "full",
-                "fading": random.choice(("ergodic", "none", "realization")),
-            },
-        }
+    vehicle = {
+        "type": "plane",
+        "min_speed": least,
+        "max_speed": fastest,
+        "max_acceleration": random.choice((2, 3, 5)),
+    }
+    flight = {
+        "start": start,
+        "end": end,
+        "altitude": random.choice((60, 100)),
+        "duration": max(random.choice((30, 60, 120, 180, 240)), round(shortest)),
+        "time_step": random.choice((0.2, 0.5, 1.0)),
+        "start_velocity": velocity(),
+        "end_velocity": velocity(),
+    }
+    radio = random_radio(
+        random, place, causal, lambda: "half" if random.random() < 0.25 else "full"
     )
+    site = {"origin": {"latitude": 47.0, "longitude": 8.5}}
+    return dump_yaml({"site": site, "vehicle": vehicle, "flight": flight, "radio": radio})
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """How one plan ended; `rate` and `best_start` in bit/s/Hz, `possible` for a refused one."""
 
     seed: int
     told: str
+    seconds: float
     converged: bool = False
     rate: float = 0.0
     best_start: float = 0.0
-    seconds: float = 0.0
     possible: bool | None = None
-
-    @property
-    def below(self) -> bool:
-        """Whether a start of its own is better than the result."""
-        return self.possible is None and self.rate < self.best_start - _BELOW
 
 
 def row(seed: int) -> Row:
@@ -110,18 +96,12 @@ def row(seed: int) -> Row:
         solution = optimize(plan)
     except InfeasibleError:
         flight = any_flight(build_problem(plan).kinematics, np.random.default_rng(seed))
-        seconds = time.process_time() - began
-        return Row(seed, "refused", seconds=seconds, possible=flight is not None)
+        return Row(seed, "refused", time.process_time() - began, possible=flight is not None)
     seconds = time.process_time() - began
     assert solution.is_feasible(), solution.residuals()
-    return Row(
-        seed,
-        solution.ending,
-        solution.converged,
-        solution.delivered_rate if plan.radio.causal else solution.rates.R_avg,
-        max(solution.starts.values()),
-        seconds,
-    )
+    rate = solution.delivered_rate if plan.radio.causal else solution.rates.R_avg
+    best = max(solution.starts.values())
+    return Row(seed, solution.ending, seconds, solution.converged, rate, best)
 
 
 def any_flight(kin: Kinematics, rng: np.random.Generator) -> Trajectory | None:
@@ -180,24 +160,20 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=1)
     asked = parser.parse_args()
     seeds = range(asked.first, asked.first + asked.plans)
-    rows: list[Row] = []
+    counts = Counter[str]()
     for each in Parallel(asked.jobs, return_as="generator")(delayed(row)(seed) for seed in seeds):
-        rows.append(each)
-        ends = f"{each.rate:.4f} of {each.best_start:.4f}" if each.possible is None else ""
-        marks = [
-            "NOT CONVERGED" if each.possible is None and not each.converged else "",
-            "BELOW A START" if each.below else "",
-            "POSSIBLE" if each.possible else "",
-        ]
-        told = " ".join(mark for mark in marks if mark)
+        solved = each.possible is None
+        marks = {
+            "NOT CONVERGED": solved and not each.converged,
+            "BELOW A START": solved and each.rate < each.best_start - _BELOW,
+            "REFUSED": not solved,
+            "POSSIBLE": bool(each.possible),
+        }
+        counts.update({mark: int(here) for mark, here in marks.items()})
+        ends = f"{each.rate:.4f} of {each.best_start:.4f}" if solved else ""
+        told = " ".join(mark for mark, here in marks.items() if here)
         print(f"{each.seed:4} {each.seconds:6.1f} s  {ends:17}  {each.told} {told}", flush=True)
-    solved = [each for each in rows if each.possible is None]
-    print(
-        f"{len(rows)} plans: {sum(not each.converged for each in solved)} not converged, "
-        f"{sum(each.below for each in solved)} below a start, {len(rows) - len(solved)} refused, "
-        f"{sum(each.possible is True for each in rows)} of these have a flight; "
-        f"{sum(each.seconds for each in rows):.0f} s of CPU"
-    )
+    print(", ".join(f"{count} {mark.lower()}" for mark, count in counts.items()))
     return 0
 
 

@@ -26,6 +26,7 @@ from faao_mav.arrays import Flags, Real
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.map_file import map_archive
+from faao_mav.radio.terrain import knife_edge_loss
 from faao_mav.schedule.prediction import rates_along
 
 SEEDS, PLANES = range(12), 100
@@ -133,8 +134,7 @@ def edges_loss(ridges: list[Ridge], station: Real, side: Real,
         at = station[:, None, None] + share * (np.stack([x, y]) - station[:, None, None])
         above = heights(ridges, *at) - (up + share * (altitude - up))
         nu = np.maximum(nu, above * np.sqrt(2 / WAVELENGTH / (share * (1 - share) * d)))
-    loss = 6.9 + 20 * np.log10(np.sqrt((nu - 0.1) ** 2 + 1) + nu - 0.1)
-    return np.where(nu > -0.78, np.maximum(0.0, loss), 0.0)
+    return knife_edge_loss(nu)
 
 
 def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) -> float:
@@ -149,7 +149,7 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
     w = np.stack([x.ravel(), y.ravel()], axis=1)
     rates = []
     for link in solution.problem.links:
-        H = link.channel(w, link.small_scale(w))
+        H = link.channel(w)
         rates.append(n * link.draw_rates(H, link.best(H[:, None])).reshape(x.shape))
     along, reach = step * np.linspace(0, 1, 15), range(-5, 6)
     steps = {  # and from where they pass over ground

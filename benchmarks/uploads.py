@@ -30,7 +30,6 @@ from faao_mav.mission import Mission
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import upload
-from faao_mav.wire.messages import WireItem
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.wire_items import wire_items
 
@@ -53,9 +52,9 @@ def ours(mock: MockAutopilot, mission: Mission, faults: Faults) -> str:
     return f"{said} | {read - stages.get('uploading', end):.2f} | {end - read:.2f}"
 
 
-def mavsdk(mock: MockAutopilot, rows: tuple[WireItem, ...], faults: Faults) -> str:
+def mavsdk(mock: MockAutopilot, mission: Mission, faults: Faults) -> str:
     """Return the same of MAVSDK, which does not read back."""
-    port = free_port()
+    port, rows = free_port(), wire_items(mission, MissionType.MISSION, mock.vehicle)
     items = [
         SdkItem(seq, r.frame, r.command, r.current, 1, *r.params, r.x, r.y, r.z, 0)
         for seq, r in enumerate(rows)
@@ -92,14 +91,10 @@ def main() -> None:
         behaviour = behaviour_of("px4" if kind == "px4" else "ardupilot")
         for count, loss in ((count, loss) for count in counts for loss in (0.0, 0.05, 0.2)):
             mission, faults = a_mission(count), Faults(loss=loss, latency=0.0)
-            for client in ("faao-mav", "MAVSDK 4.1.0"):
+            for client, uploaded in (("faao-mav", ours), ("MAVSDK 4.1.0", mavsdk)):
                 mock = MockAutopilot(behaviour, home=HOME, beat=0.1)
                 rows = wire_items(mission, MissionType.MISSION, mock.vehicle)
-                cells = (
-                    ours(mock, mission, faults)
-                    if client == "faao-mav"
-                    else mavsdk(mock, rows, faults)
-                )
+                cells = uploaded(mock, mission, faults)
                 right = places(mock.lists.items(MissionType.MISSION)) == places(rows)
                 row = f"| {kind} | {count} | {loss:.0%} | {client} | {cells}"
                 print(f"{row} | {'yes' if right else 'no'} |", flush=True)

@@ -129,5 +129,5 @@ def test_what_becomes_of_it(
     "seed", [pytest.param(n, marks=[pytest.mark.slow] * (n >= 6)) for n in range(30)]
 )
 def test_in_no_trouble_what_must_not_happen_does(seed: int) -> None:
-    """The first of the flights that `benchmarks/campaign.py` flies."""
+    """The first flights that meet trouble at random: any number of seeds can be flown."""
     assert flown(Trial.of(seed)).wrong == []
