@@ -49,11 +49,25 @@ class PlanError(InputError):
 
 
 class MissionFileError(InputError):
-    """A mission file cannot be read or written."""
+    """A mission file cannot be read or written.
+
+    >>> from faao_mav import read_mission
+    >>> read_mission("missions/copter_relay.yaml")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.MissionFileError: missions/copter_relay.yaml: '.yaml'; expected a name that ...
+    """
 
 
 class ParameterFileError(InputError):
-    """A file of autopilot parameters cannot be read or written."""
+    """A file of autopilot parameters cannot be read or written.
+
+    >>> from faao_mav import read_parameters
+    >>> read_parameters("nowhere.param")
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.ParameterFileError: nowhere.param: cannot be read: No such file or directory
+    """
 
 
 class InfeasibleError(FaaoError):
@@ -70,11 +84,22 @@ class InfeasibleError(FaaoError):
 
 
 class SolverError(FaaoError):
-    """A numerical solver gave up before there was anything to return."""
+    """A numerical solver gave up before there was anything to return.
+
+    >>> issubclass(SolverError, FaaoError), issubclass(SolverError, InputError)
+    (True, False)
+    """
 
 
 class LinkError(FaaoError):
-    """A vehicle cannot be reached, or did not do what was asked."""
+    """A vehicle cannot be reached, or did not do what was asked.
+
+    >>> from faao_mav import download
+    >>> download("udpout:127.0.0.1:9", wait=0.1)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+        ...
+    faao_mav.errors.LinkError: udpout:127.0.0.1:9: no heartbeat of an autopilot within 0.1 s; ...
+    """
 
 
 class HangUp(KeyboardInterrupt):

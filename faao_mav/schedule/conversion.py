@@ -108,6 +108,13 @@ def convert(solution: Solution) -> Conversion:
     A route whose legs or predicted flight leave the plan's fence is made anew with half the path
     tolerance, again and again down to 0.25 m; if none keeps inside, it is the one that leaves the
     fence the least. The rest is as in `_convert`.
+
+    >>> from faao_mav import optimize, read_plan
+    >>> brief = {"radio.fading": "none", "flight.duration": 30, "flight.end": [0, 300]}
+    >>> brief["mission.parameters"] = "keep"
+    >>> found = convert(optimize(read_plan("missions/copter_relay.yaml").changed(brief)))
+    >>> found.mission.items[-1].command.name, found.parameters
+    ('NAV_RETURN_TO_LAUNCH', {})
     """
     plan, area = solution.plan, solution.plan.keep_in
     best = _convert(solution, plan)
