@@ -131,11 +131,6 @@ class DifferenceClasses:
     bits: float
     part_differences: Real | None
 
-    @property
-    def weight(self) -> Real:
-        """The probability of each class when m and k are drawn at random, (k,)."""
-        return self.multiplicity / float(self.symbols) ** 2
-
 
 def _scalar_differences(grid: Complex) -> tuple[Complex, Real]:
     """Return the distinct differences of two symbols, zero too, and how many pairs give each."""

@@ -22,7 +22,6 @@ from faao_mav.radio.spline import Spline
 PER_DB = float(np.log(10.0) / 10.0)
 """The natural logarithm of a gain of 1 dB."""
 
-
 _STEP = 1e-3
 """Step of ln d² in central differences: second derivatives of logarithms err by some 1e-6."""
 
@@ -179,7 +178,7 @@ class GainField:
     law: GainFunction
     station: Real
     height: float
-    above: Grid | Spline | None = None
+    above: Spline | None = None
 
     @property
     def midway(self) -> Real:

@@ -7,7 +7,6 @@ spline, which rounds its edges over a cell.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -86,9 +85,9 @@ class GainMap:
         """
         db = filled(self._between(height))
         if not self.above_law:
-            return Grid(self.east, self.north, db.T)
+            return Grid.through(self.east, self.north, db.T)
         x, y = (_widened(side) for side in (self.east, self.north))
-        return Grid(x, y, np.pad(db.T, 1))
+        return Grid.through(x, y, np.pad(db.T, 1))
 
     def barred(self, height: float) -> Flags:
         """Return where no aircraft can be at a `height`, m: (m, k)."""
@@ -101,36 +100,27 @@ class GainMap:
         return np.asarray((1 - share) * self.db[low] + share * self.db[high])
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
-    """A bilinear function f, `values` (k, m) on the even grids `x` (k,) and `y` (m,), m.
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid(Spline):
+    """A bilinear function f, of `values` (k, m) on the even grids `x` (k,) and `y` (m,), m.
 
-    Beyond them f is that of the nearest point.
+    Beyond them f is that of the nearest point; its derivatives are those within the cells.
 
     >>> side = np.array([0.0, 10.0])
-    >>> grid = Grid(side, side, np.array([[0.0, 2.0], [4.0, 6.0]]))
+    >>> grid = Grid.through(side, side, np.array([[0.0, 2.0], [4.0, 6.0]]))
     >>> float(grid.value(np.array(5.0), np.array(10.0)))
     4.0
     """
 
-    x: Real
-    y: Real
     values: Real
 
-    def value(self, x: Real, y: Real) -> Real:
-        """Return f at x (...) and y (...)."""
-        return self._pieces.value(x, y)
-
-    def by_both(self, x: Real, y: Real) -> tuple[Real, Real, Real, Real, Real, Real]:
-        """Return f, f_x, f_y, f_xx, f_xy and f_yy, within the cells."""
-        return self._pieces.by_both(x, y)
-
-    @cached_property
-    def _pieces(self) -> Spline:
-        f, dy = self.values, self.y[1] - self.y[0]
-        f_x, f_y = np.diff(f, axis=0) / (self.x[1] - self.x[0]), np.diff(f, axis=1) / dy
+    @classmethod
+    def through(cls, x: Real, y: Real, values: Real) -> "Grid":
+        """Return the function of `values` on the grids `x` and `y`."""
+        f, dy = values, y[1] - y[0]
+        f_x, f_y = np.diff(f, axis=0) / (x[1] - x[0]), np.diff(f, axis=1) / dy
         cells = np.array([[np.diff(f_x, axis=1) / dy, f_y[:-1]], [f_x[:, :-1], f[:-1, :-1]]])
-        return Spline(self.x, self.y, cells.reshape(2, 2, -1))
+        return cls(x, y, cells.reshape(2, 2, -1), values)
 
     def most_between(self, x: Real, y: Real) -> Real:
         """Return the most of f in the boxes between rising x (i + 1,) and y (j + 1,), (i, j), m."""

@@ -25,35 +25,29 @@ _MOST_BYTES = 200_000_000
 _FARTHEST = 100_000.0
 """Metres from the station beyond which positions are taken for mistaken. Chosen."""
 
-_WORDS = {
-    "time": ("time", "timestamp", "t", "seconds"),
-    "latitude": ("latitude", "lat"),
-    "longitude": ("longitude", "lon", "lng", "long"),
-    "altitude": ("altitude", "alt", "height"),
-    "rsrp": ("rsrp",),
-    "rssi": ("rssi", "power", "signal"),
-    "snr": ("snr", "sinr"),
-    "throughput": ("throughput", "rate", "goodput"),
-}
-"""What a table's header may call its columns, of which the last four are levels."""
-
-_PLACES, _LEVELS = tuple(_WORDS)[:4], tuple(_WORDS)[4:]
-
+_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
 _DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0}
-_UNITS: Mapping[str, Mapping[str, float]] = {
-    "time": {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6},
-    "latitude": _DEGREES,
-    "longitude": _DEGREES,
-    "altitude": {"m": 1.0, "meters": 1.0, "metres": 1.0, "ft": 0.3048, "feet": 0.3048},
-    "rsrp": {"dbm": 1.0},
-    "rssi": {"dbm": 1.0, "sik": 1.0, "raw": 1.0},
-    "snr": {"db": 1.0},
-    "throughput": dict.fromkeys(("mbit/s", "mbps", "mbit_per_s"), 1.0)
-    | dict.fromkeys(("kbit/s", "kbps", "kbit_per_s"), 1e-3)
-    | dict.fromkeys(("bit/s", "bps", "bit_per_s"), 1e-6),
+_METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "ft": 0.3048, "feet": 0.3048}
+_MBIT_PER_S = {
+    unit.format(prefix): size
+    for prefix, size in (("m", 1.0), ("k", 1e-3), ("", 1e-6))
+    for unit in ("{}bit/s", "{}bps", "{}bit_per_s")
 }
-"""The units of a column, in s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count, `raw` is
-any other device's count."""
+_COLUMNS: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "time": ("time timestamp t seconds", _SECONDS),
+    "latitude": ("latitude lat", _DEGREES),
+    "longitude": ("longitude lon lng long", _DEGREES),
+    "altitude": ("altitude alt height", _METRES),
+    "rsrp": ("rsrp", {"dbm": 1.0}),
+    "rssi": ("rssi power signal", {"dbm": 1.0, "sik": 1.0, "raw": 1.0}),
+    "snr": ("snr sinr", {"db": 1.0}),
+    "throughput": ("throughput rate goodput", _MBIT_PER_S),
+}
+"""What a table's header may call its columns, of which the last four are levels, and their units in
+s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count, `raw` is any other device's count."""
+
+_PLACES, _LEVELS = tuple(_COLUMNS)[:4], tuple(_COLUMNS)[4:]
+_CALLED = {word: name for name, (words, _) in _COLUMNS.items() for word in words.split()}
 
 SIK_STEP, _SIK_AT_ZERO = 1.0 / 1.9, -127.0
 """dB a count of a SiK radio, and dBm that it counts as 0 (ArduPilot, "SiK Radio: Advanced
@@ -101,8 +95,8 @@ def read_measured(
     ('dbm', [[0.0, 111.0, 50.0]], [-70.0])
     """
     path = Path(path)
-    if unknown := units.keys() - _WORDS.keys():
-        text = f"--unit {min(unknown)}: no such column; give one of {', '.join(_WORDS)}"
+    if unknown := units.keys() - _COLUMNS.keys():
+        text = f"--unit {min(unknown)}: no such column; give one of {', '.join(_COLUMNS)}"
         raise InputError(text)
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
     lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
@@ -119,7 +113,7 @@ def read_measured(
     if not sound.any():
         raise InputError(f"{path}: no row with {', '.join(columns)}; expected the rows of a flight")
     kept = {
-        name: values * _UNITS[name][unit_of[name]]
+        name: values * _COLUMNS[name][1][unit_of[name]]
         for name, values in zip(columns, rows[sound].T, strict=True)
     }
     told, unit = level_of(path, kept[level], unit_of[level], calibration)
@@ -181,11 +175,10 @@ def _columns(
     columns, unit_of = dict[str, int](), dict[str, str]()
     for number, told in enumerate(header):
         words = re.findall(r"[^\s_()\[\],]+", told.lower())
-        name = next((n for n, known in _WORDS.items() if words and words[0] in known), None)
-        if name is None or name in columns:
-            continue
-        columns[name] = number
-        unit_of[name] = units.get(name, "_".join(words[1:])).lower()
+        name = _CALLED.get(words[0]) if words else None
+        if name is not None and name not in columns:
+            columns[name] = number
+            unit_of[name] = units.get(name, "_".join(words[1:])).lower()
     missing = [name for name in _PLACES if name not in columns]
     levels = [name for name in columns if name in _LEVELS]
     if missing or not levels:
@@ -194,7 +187,7 @@ def _columns(
     for name in levels[1:]:
         del columns[name]
     for name in columns:
-        known = _UNITS[name]
+        _, known = _COLUMNS[name]
         if unit_of[name] not in known:
             had = f"unit {unit_of[name]!r}" if unit_of[name] else "no unit"
             raise InputError(

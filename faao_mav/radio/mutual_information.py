@@ -9,7 +9,6 @@ received changes nothing. The lattice is ten lines of the project's own: importi
 takes a second.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -46,47 +45,23 @@ _NOISES = 128
 """Noises handled together at least, which keeps the inner loops long. Chosen."""
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseSet:
-    """What is sent, and the noise that it meets, for each of S draws of a channel.
-
-    `points` (M, D) are all input vectors x of (3) in real coordinates, [x] for BPSK and [Re x,
-    Im x] else; `sent` (S, q) counts their rows; the noises `z` (S, q, D) are N(0, I).
-    """
-
-    points: Real
-    sent: Integers
-    z: Real
-
-
-def _sent(modulation: str, antennas: int) -> Integers:
-    """Return the rows of ``symbol_vectors`` over which it is enough to average.
-
-    A rotation that maps the alphabet onto itself maps the noise onto equally likely noise: vectors
-    that differ by one contribute the same, and no vector is left fixed.
-    """
-    symbols = constellation(modulation)
-    sector = 2.0 * np.pi / {"bpsk": 2, "8psk": 8}.get(modulation, 4)
-    keep = (np.angle(symbols) + 1e-9) % (2.0 * np.pi) < sector
-    # The first entry runs slowest in symbol_vectors.
-    return np.flatnonzero(np.repeat(keep, len(symbols) ** (antennas - 1)))
-
-
 @lru_cache(maxsize=16)
 def noise_set(
     modulation: str, antennas: int, draws: int, nodes: int = NODES, seed: int = SEED
-) -> NoiseSet:
-    """Return the fixed set for an alphabet on so many antennas, and so many draws.
+) -> tuple[Real, Integers, Real]:
+    """Return what is sent, and the noise that it meets, for each of S `draws` of a channel.
 
-    It is a rank-1 lattice of about `nodes` points, of which every draw has as many, moved by a
-    random shift of the `seed` and folded (the tent transform, which makes the integrand periodic);
-    normal numbers are made of even ones as Box and Muller do.
+    First all input vectors x of (3) in real coordinates (M, D), [x] for BPSK and [Re x, Im x] else;
+    then (S, q) which of them are sent, and their noises (S, q, D), of N(0, I). It is a rank-1
+    lattice of about `nodes` points, of which every draw has as many, moved by a random shift of the
+    `seed` and folded (the tent transform, which makes the integrand periodic); normal numbers are
+    made of even ones as Box and Muller do.
 
-    >>> noise_set("bpsk", 1, 4).z.shape
-    (4, 1024, 1)
+    >>> [part.shape for part in noise_set("bpsk", 1, 4)]
+    [(2, 1), (4, 1024), (4, 1024, 1)]
     """
     x = symbol_vectors(modulation, antennas)
-    points = x.real if modulation == "bpsk" else np.hstack([x.real, x.imag])
+    points = np.ascontiguousarray(x.real if modulation == "bpsk" else np.hstack([x.real, x.imag]))
     dimensions = points.shape[1]
     half = (dimensions + 1) // 2
     each = 2 ** max(0, round(float(np.log2(nodes / draws))))
@@ -99,13 +74,17 @@ def noise_set(
     even = np.minimum(even, 1.0 - _RAREST)
     # in random order: draws that change slowly from one to the next would meet few of the vectors
     even = even.reshape(each, parts, -1).swapaxes(0, 1)[rng.permutation(parts)[:draws]]
-    kept = _sent(modulation, antennas)
+    # A rotation that maps the alphabet onto itself maps the noise onto equally likely noise: it is
+    # enough that the first symbol, whose index runs slowest in `symbol_vectors`, is in one sector.
+    symbols = constellation(modulation)
+    sector = 2.0 * np.pi / {"bpsk": 2, "8psk": 8}.get(modulation, 4)
+    first = (np.angle(symbols) + 1e-9) % (2.0 * np.pi) < sector
+    kept = np.flatnonzero(np.repeat(first, len(symbols) ** (antennas - 1)))
     sent = kept[(even[..., 0] * len(kept)).astype(np.intp)]
     radius = np.sqrt(-2.0 * np.log1p(-even[..., 1 : 1 + half]))
     angle = 2.0 * np.pi * even[..., 1 + half :]
     z = np.concatenate([radius * np.cos(angle), radius * np.sin(angle)], -1)[..., :dimensions]
-    points = np.ascontiguousarray(points)
-    return NoiseSet(points, np.hstack([sent, sent]), np.hstack([z, -z]))
+    return points, np.hstack([sent, sent]), np.hstack([z, -z])
 
 
 def mutual_information(
@@ -140,34 +119,25 @@ def mutual_information(
     if not noise > 0.0:
         raise InputError(f"the noise power must be above 0, got {noise}")
     A = np.asarray(H, dtype=np.complex128) @ P
-    flat = A.reshape(-1, *A.shape[-3:])
-    used = noise_set(modulation, A.shape[-1], A.shape[-3], nodes, seed)
-    return _averages(flat, used, noise, errors).reshape(A.shape[:-2])
-
-
-def _averages(A: Complex, used: NoiseSet, noise: float, errors: Complex | None) -> Real:
-    """Return the information (b, S) at A = H P (b, S, N_r, N_t), and fill `errors` if asked for.
-
-    It is N log2(rho) less the mean of log2 Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z. With
-    ||y - s_k||² expanded, all exponents are one product of matrices. That of the vector sent is
-    -||z||² / 2: the sum never underflows for noises that are drawn.
-    """
-    b, S, _, N = A.shape
-    points, q = used.points, used.z.shape[1]
-    maps = _maps(A.reshape(b * S, *A.shape[2:]), noise, real=points.shape[1] == N)
-    value = np.zeros(b * S)
-    missed_products = None if errors is None else errors.reshape(b * S, N, N)
+    S, receive, N = A.shape[-3:]
+    points, rows, noises = noise_set(modulation, N, S, nodes, seed)
+    maps, q = _maps(A.reshape(-1, receive, N), noise, real=points.shape[1] == N), rows.shape[1]
+    value = np.zeros(len(maps))
+    missed_products = None if errors is None else errors.reshape(-1, N, N)
+    # It is N log2(rho) less the mean of log2 Σ_k p(y|s_k) / p(y|s_m) at y = s_m + z. With
+    # ||y - s_k||² expanded, all exponents are one product of matrices. That of the vector sent is
+    # -||z||² / 2: the sum never underflows for noises that are drawn.
     # Long rows of noises keep the inner loops long; the rest of the room goes to channels.
     group = max(1, _CHUNK // (len(points) * min(q, _NOISES)))
     step = max(1, _CHUNK // (len(points) * group))
-    for first in range(0, b * S, group):
-        channels = np.arange(first, min(first + group, b * S))
+    for first in range(0, len(maps), group):
+        channels = np.arange(first, min(first + group, len(maps)))
         s = points @ maps[channels]
         ones = np.ones((*s.shape[:2], 1))
         left = np.concatenate([s, -0.5 * np.sum(s**2, axis=-1, keepdims=True), -ones], axis=-1)
         for start in range(0, q, step):
             part = slice(start, start + step)
-            sent, z = used.sent[channels % S, part], used.z[channels % S, part]
+            sent, z = rows[channels % S, part], noises[channels % S, part]
             y = np.take_along_axis(s, sent[..., None], axis=1) + z
             half = 0.5 * np.sum(y**2, axis=-1, keepdims=True)
             right = np.concatenate([y, np.ones_like(half), half], axis=-1)
@@ -181,7 +151,7 @@ def _averages(A: Complex, used: NoiseSet, noise: float, errors: Complex | None) 
                 missed_products[channels] += x.mT @ x.conj() / q
     # The sum in (5) is never below its own term: only rounding makes its logarithm negative.
     bits = np.log2(len(points))
-    return np.asarray(bits - np.maximum(value / q, 0.0) / _LN2).reshape(b, S)
+    return np.asarray(bits - np.maximum(value / q, 0.0) / _LN2).reshape(A.shape[:-2])
 
 
 def _maps(A: Complex, noise: float, *, real: bool) -> Real:

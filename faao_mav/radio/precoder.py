@@ -42,20 +42,16 @@ def with_power(P: Complex, power: float) -> Complex:
     return np.asarray(P * np.sqrt(power / energy), dtype=np.complex128)
 
 
-def _svd(H: RealOrComplex) -> tuple[Complex, Real, Complex]:
-    """Return U, s, V^H, with V for U where N_r > N_t: the right polar factor is V s V^H."""
+def _by_modes(H: RealOrComplex, power: float, gains: Callable[[Real], Real]) -> Complex:
+    """Return V diag(gains(s)) U^H of H = U diag(s) V^H, widened to N_t columns, of the power.
+
+    V stands for U where N_r > N_t: the right polar factor is V diag(s) V^H.
+    """
     receive, transmit = np.shape(H)[-2:]
     U, s, Vh = np.linalg.svd(np.asarray(H, dtype=np.complex128), full_matrices=False)
-    if receive > transmit:
-        U = Vh.conj().mT
-    return U, s, Vh
-
-
-def _from_gains(U: Complex, gains: Real, Vh: Complex, power: float) -> Complex:
-    """Return V diag(gains) U^H, widened to N_t columns and scaled to the power."""
     V = Vh.conj().mT
-    P = (V * gains[..., None, :]) @ U.conj().mT
-    missing = P.shape[-2] - P.shape[-1]
+    P = (V * gains(s)[..., None, :]) @ (V if receive > transmit else U).conj().mT
+    missing = max(0, transmit - receive)
     return with_power(np.pad(P, [(0, 0)] * (P.ndim - 1) + [(0, missing)]), power)
 
 
@@ -70,8 +66,7 @@ def mrt(H: RealOrComplex, power: float, noise: float) -> Complex:  # noqa: ARG00
     array([[3., 0.],
            [0., 4.]])
     """
-    U, s, Vh = _svd(H)
-    return _from_gains(U, s, Vh, power)
+    return _by_modes(H, power, lambda s: s)
 
 
 def zf(H: RealOrComplex, power: float, noise: float) -> Complex:  # noqa: ARG001
@@ -83,10 +78,12 @@ def zf(H: RealOrComplex, power: float, noise: float) -> Complex:  # noqa: ARG001
     array([[4., 0.],
            [0., 3.]])
     """
-    U, s, Vh = _svd(H)
-    kept = s > _RANK * s[..., :1]
-    gains = np.where(kept, s[..., :1] / np.where(kept, s, 1.0), 0.0)
-    return _from_gains(U, gains, Vh, power)
+
+    def inverse(s: Real) -> Real:
+        kept = s > _RANK * s[..., :1]
+        return np.where(kept, s[..., :1] / np.where(kept, s, 1.0), 0.0)
+
+    return _by_modes(H, power, inverse)
 
 
 def mmse(H: RealOrComplex, power: float, noise: float) -> Complex:
@@ -103,8 +100,7 @@ def mmse(H: RealOrComplex, power: float, noise: float) -> Complex:
     """
     check_positive("transmit power", power)
     check_positive("noise power", noise)
-    U, s, Vh = _svd(H)
-    return _from_gains(U, s / (s**2 + s.shape[-1] * noise / power), Vh, power)
+    return _by_modes(H, power, lambda s: s / (s**2 + s.shape[-1] * noise / power))
 
 
 def waterfilling(H: RealOrComplex, power: float, noise: float) -> Complex:

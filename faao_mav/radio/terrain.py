@@ -116,7 +116,7 @@ def terrain_map(
             f"--terrain: no height at {lost[0]:.5f}, {lost[1]:.5f}; expected all of {radius:g} m "
             "each way of the station: give more files, or --radius"
         )
-    terrain, wavelength = Grid(fine, fine, found.T), _LIGHT / frequency
+    terrain, wavelength = Grid.through(fine, fine, found.T), _LIGHT / frequency
     points = math.ceil(math.sqrt(2) * radius / step)
     share = np.arange(1.0, points + 1)[:, None] / (points + 1)
     own = terrain.value(np.zeros(1), np.zeros(1))[0]

@@ -44,7 +44,7 @@ def rough_grid(seed: int, cells: int = 12, low: float = -40.0, high: float = 110
     """Return shadows of 20 dB that end within a cell."""
     rng = np.random.default_rng(seed)
     x, y = np.linspace(low, high, cells), np.linspace(low + 7, high - 3, cells + 3)
-    return Grid(x, y, np.where(rng.random((cells, cells + 3)) < 0.4, -20.0, 0.0))
+    return Grid.through(x, y, np.where(rng.random((cells, cells + 3)) < 0.4, -20.0, 0.0))
 
 
 def with_maps(problem: Problem, *grids: Grid) -> Problem:
