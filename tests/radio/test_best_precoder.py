@@ -15,45 +15,40 @@ from faao_mav.radio.mutual_information import mutual_information
 from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.rate import Measure, cutoff_rate, draw_rates
 
-SETTINGS = settings(max_examples=15, deadline=None, derandomize=True)
+SETTINGS = settings(max_examples=10)
 SEEDS = st.integers(0, 2**32 - 1)
 TABLE = np.array([[2.0, 1.0], [1.0, 1.0]]) * np.sqrt(0.5)
 
 
 def best(
-    H: RealOrComplex,
-    W: float,
-    modulation: str,
-    noise: float = 1.0,
-    *,
-    start: RealOrComplex | None = None,
+    H: RealOrComplex, W: float, modulation: str, start: RealOrComplex | None = None
 ) -> tuple[Complex, Real]:
     """The best precoders of single channels (..., N_r, N_t), of power W, and their cutoff rates."""
-    P = best_precoders(H[..., None, :, :], W, modulation, noise, start=start)
+    P = best_precoders(H[..., None, :, :], W, modulation, 1.0, start=start)
     np.testing.assert_allclose(power_of(P), W, rtol=1e-12)
-    return P, cutoff_rate(H, P, difference_classes(modulation, H.shape[-1]), noise)
+    return P, cutoff_rate(H, P, difference_classes(modulation, H.shape[-1]), 1.0)
 
 
 @pytest.mark.parametrize("measure", ["cutoff", "mutual_information"])
-@pytest.mark.parametrize(("modulation", "draws"), [("qpsk", 1), ("qpsk", 3), ("16qam", 2)])
+@pytest.mark.parametrize(("modulation", "draws"), [("qpsk", 1), ("8psk", 2)])
 def test_no_other_precoder_near_it_is_better(measure: Measure, modulation: str, draws: int) -> None:
-    H = channel(3, 4, draws, 2, 2)
+    H = channel(3, 2, draws, 2, 2)
     P = best_precoders(H, 3.0, modulation, 1.0, measure=measure)
 
     def rate(P: Complex) -> Real:
         return np.asarray(draw_rates(measure, H, P[:, None], modulation, 1.0).mean(axis=1))
 
-    for seed in range(20):
-        other = P + 0.02 * channel(seed, 4, 2, 2)
+    for seed in range(10):
+        other = P + 0.02 * channel(seed, 2, 2, 2)
         other *= np.sqrt(3.0 / power_of(other))[:, None, None]
         # the slope of the mutual information at so many noises is nearly that of its value
         assert np.all(rate(other) < rate(P) + (1e-5 if measure == "cutoff" else 2e-3))
 
 
 @SETTINGS
-@given(seed=SEEDS, snr=st.floats(0.01, 100.0))
-def test_closed_forms(seed: int, snr: float) -> None:
-    H = channel(seed, 8, 2, 2)
+@given(seed=SEEDS, snr=st.floats(0.01, 100.0), receive=st.integers(1, 3))
+def test_closed_forms(seed: int, snr: float, receive: int) -> None:
+    H = channel(seed, 4, receive, 2)
     _, rate = best(H, snr, "bpsk")
     np.testing.assert_allclose(rate, bpsk_two_antennas_rate(H, snr, 1.0), rtol=1e-9)
     searched = best_precoders(np.stack([H, H], axis=1), snr, "bpsk", 1.0)
@@ -91,26 +86,20 @@ def test_never_below_the_classical_schemes(
         assert np.all(rate >= cutoff_rate(H, P, classes, 1.0) - 1e-6)
 
 
-def multistart(H: Complex, W: float, modulation: str, seed: int) -> float:
-    """The least log-sum of 15 searches by a general optimiser from random points."""
-    N = H.shape[-1]
-
-    def objective(x: Real) -> float:
-        P = (x[: N * N] + 1j * x[N * N :]).reshape(N, N)
-        return float(log_sum(H, P * np.sqrt(W / power_of(P)), modulation))
-
-    points = np.random.default_rng(seed).standard_normal((15, 2 * N * N))
-    return min(float(minimize(objective, x, method="BFGS").fun) for x in points)
-
-
 @pytest.mark.parametrize(
-    ("modulation", "W", "seed"),
-    [("qpsk", 1.0, 1), ("qpsk", 4.0, 2), ("qpsk", 12.0, 3), ("8psk", 8.0, 4), ("16qam", 5.0, 5)],
+    ("modulation", "W", "seed"), [("qpsk", 4.0, 2), ("qpsk", 12.0, 3), ("8psk", 8.0, 4)]
 )
 def test_as_good_as_many_random_starts(modulation: str, W: float, seed: int) -> None:
+    """Beside the least log-sum of 10 searches by a general optimiser from random points."""
     H = channel(seed, 2, 2)
-    found = float(log_sum(H, best(H, W, modulation)[0], modulation))
-    assert found < multistart(H, W, modulation, seed) + 1e-3
+
+    def objective(x: Real) -> float:
+        P = (x[:4] + 1j * x[4:]).reshape(2, 2)
+        return float(log_sum(H, P * np.sqrt(W / power_of(P)), modulation))
+
+    points = np.random.default_rng(seed).standard_normal((10, 8))
+    least = min(float(minimize(objective, x, method="BFGS").fun) for x in points)
+    assert float(log_sum(H, best(H, W, modulation)[0], modulation)) < least + 1e-3
 
 
 def test_channels_that_lead_nowhere() -> None:
@@ -129,7 +118,7 @@ def test_channels_that_lead_nowhere() -> None:
 
 
 @pytest.mark.parametrize("modulation", ["bpsk", "qpsk", "16qam"])
-@pytest.mark.parametrize("snr", [1e-12, 1e-9, 1e-5, 1e4, 1e9])
+@pytest.mark.parametrize("snr", [1e-12, 1e-5, 1e4, 1e9])
 def test_extremes(modulation: str, snr: float) -> None:
     H = channel(8, 4, 2, 2)
     P, rate = best(H, snr, modulation)
@@ -165,8 +154,7 @@ def test_a_start_is_never_worse(
     assert np.all(after >= before - 1e-12)
 
 
-@pytest.mark.parametrize("modulation", ["bpsk", "qpsk"])
-@pytest.mark.parametrize("W", [0.3, 3.0, 30.0])
+@pytest.mark.parametrize(("modulation", "W"), [("bpsk", 0.3), ("qpsk", 3.0), ("qpsk", 30.0)])
 def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
     los = np.array([[1.0, 1.0], [1.0, np.exp(0.7j)]])
     draws = (np.sqrt(3.0) * los + channel(14, 5, 32, 2, 2)) / 2.0
@@ -175,26 +163,17 @@ def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
     def mean(P: Complex) -> Real:
         return np.asarray(np.mean(cutoff_rate(draws, P, classes, 1.0), axis=1))
 
-    P = best_precoders(draws, W, modulation, 1.0)
-    rate = mean(P[:, None])
-    known, _ = best(los, W, modulation)
-    for other in (known, np.eye(2) * np.sqrt(W / 2.0)):
-        assert np.all(rate >= mean(other) * (1.0 - 1e-7))
-    assert np.mean(rate) > np.mean(mean(known))
+    rate = mean(best_precoders(draws, W, modulation, 1.0)[:, None])
+    known = mean(best(los, W, modulation)[0])
+    for other in (known, mean(np.eye(2) * np.sqrt(W / 2.0))):
+        assert np.all(rate >= other * (1.0 - 1e-7))
+    assert np.mean(rate) > np.mean(known)
     # but not the precoders of somebody who knows the fading
     assert np.all(rate <= np.mean(best(draws, W, modulation)[1], axis=1))
 
 
 def test_more_mutual_information_than_the_precoders_of_the_cutoff_rate() -> None:
-    H = channel(9, 6, 1, 2, 2) * np.linspace(0.4, 2.8, 6)[:, None, None, None]
-    carried = [
-        mutual_information(
-            H, best_precoders(H, 1.5, "qpsk", 1.0, measure=measure)[:, None], "qpsk", 1.0
-        )
-        for measure in ("mutual_information", "cutoff")
-    ]
-    assert np.all(carried[0] >= carried[1] - 1e-9)
-    # At -5 dB 1.6376 bit on one mode, 1.4958 on those of the highest cutoff rate.
+    """At -5 dB 1.6376 bit on one mode, 1.4958 on those of the highest cutoff rate."""
     H = np.array([[[2.0, 1.0], [1.0, 1.0]]]) * np.sqrt(10**-0.5 / 2)
     P = best_precoders(H, 2.0, "qpsk", 1.0, measure="mutual_information")
     assert mutual_information(H, P[None], "qpsk", 1.0)[0] > 1.63

@@ -1,32 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.radio.channel import (
-    balanced_rayleigh,
-    line_of_sight_ula,
-    rayleigh,
-    rician,
-)
-
-ANGLES = st.floats(-1e3, 1e3).filter(lambda x: abs(x) > 1.0)
-
-
-def displacement(w: Real, p: Real, altitude: float) -> Real:
-    """The vector from a station at p to the UAV at w, (3,) m east, north, up."""
-    return np.array([*(w - p), altitude])
-
-
-@settings(deadline=None, derandomize=True)
-@given(ANGLES, ANGLES)
-def test_ula_links_are_reciprocal(x: float, y: float) -> None:
-    up = displacement(np.array([x, y]), np.zeros(2), 100.0)
-    np.testing.assert_allclose(
-        line_of_sight_ula(-up, 2, 3), line_of_sight_ula(up, 3, 2).T, rtol=1e-12
-    )
+from faao_mav.radio.channel import balanced_rayleigh, line_of_sight_ula, rayleigh, rician
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -35,7 +11,7 @@ def test_ula_agrees_with_the_positions_of_the_elements(
     sign: float, horizontal: tuple[float, float]
 ) -> None:
     wavelength = 1e-4
-    path = sign * displacement(np.array(horizontal), np.zeros(2), 100.0)
+    path = sign * np.array([*horizontal, 100.0])
     east = np.array([0.5 * wavelength, 0.0, 0.0])
     transmitters = np.arange(2)[:, None] * east
     receivers = path + np.arange(3)[:, None] * east

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, Samples, fit_link
+from faao_mav.radio.fit import LinkFit, Samples, fit_link
 
 
 def flight(height: float, seed: int = 0, rows: int = 6) -> Samples:
@@ -52,10 +52,9 @@ def off(fit: LinkFit, gain: tuple[float, ...]) -> float:
 LAWS = [(-40.0, 2.0), (-45.0, 2.7), (-50.0, 2.0, 30.0, -25.0), (-48.0, 2.0, 20.0)]
 
 
-@pytest.mark.parametrize("gain", LAWS)
-def test_a_law_is_found_within_its_stated_error(gain: tuple[float, ...]) -> None:
-    flights = [flight(height, seed) for seed, height in enumerate((40.0, 80.0, 120.0))]
-    for seed in range(3):
+def test_laws_are_found_within_their_stated_errors() -> None:
+    flights = [flight(height, seed, 5) for seed, height in enumerate((40.0, 80.0, 120.0))]
+    for seed, gain in enumerate(LAWS):
         fit = fit_link(levels(flights, gain, 4.0, 30.0, seed))
         assert fit.heights == 3
         assert fit.legs >= 15
@@ -65,7 +64,7 @@ def test_a_law_is_found_within_its_stated_error(gain: tuple[float, ...]) -> None
         assert fit.holds
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10)
 @given(
     level=st.floats(-70, -20),
     exponent=st.floats(1.6, 4.0),
@@ -84,11 +83,8 @@ def test_without_noise_the_law_itself_is_found(
 def test_outliers_move_nothing() -> None:
     gain = (-45.0, 2.0, 20.0)
     clean = levels([flight(50.0), flight(100.0, 1)], gain, 3.0, 30.0, 1)
-    struck = []
-    for each in clean:
-        level = each.level.copy()
-        level[::40] += 60.0
-        struck.append(replace(each, level=level))
+    rare = [60.0 * (np.arange(len(each.t)) % 40 == 0) for each in clean]
+    struck = [replace(each, level=each.level + x) for each, x in zip(clean, rare, strict=True)]
     assert off(fit_link(struck), gain) < off(fit_link(clean), gain) + 1.0
 
 
@@ -123,20 +119,10 @@ def test_no_elevation_spread_gives_no_terms_that_run_wild() -> None:
         assert off(fit, (-45.0, 2.0)) < 3.0
 
 
-def test_where_no_law_holds_it_is_said() -> None:
-    flights = [flight(height) for height in (40.0, 90.0)]
-    fit = fit_link(levels(flights, (-45.0, 2.0), 14.0, 40.0, 3))
-    assert fit.spread > SPREAD_OF_NO_LAW
-    assert not fit.holds
-
-
-@pytest.mark.parametrize("what", ["few", "still"])
-def test_no_flight_is_refused(what: str) -> None:
-    some = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)[0]
-    if what == "few":
-        some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
-        with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
-            fit_link([some])
-    else:
-        with pytest.raises(InputError, match="one place alone"):
-            fit_link([replace(some, place=0 * some.place + 40.0)])
+def test_no_flight_is_refused() -> None:
+    (some,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
+    with pytest.raises(InputError, match="one place alone"):
+        fit_link([replace(some, place=0 * some.place + 40.0)])
+    some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
+    with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
+        fit_link([some])

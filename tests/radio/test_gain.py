@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.radio.gain import PathGain
@@ -12,12 +12,6 @@ LAWS = st.builds(PathGain, st.just(1e-5), st.floats(0, 6), TERMS)
 HEIGHTS = st.floats(-300, 300).filter(lambda H: abs(H) > 1)
 
 
-def test_the_default_is_the_inverse_square() -> None:
-    squared = np.array([1e4, 500.0**2 + 100.0**2])
-    np.testing.assert_allclose(PathGain(1e-5).gain(squared, 100.0), 1e-5 / squared, rtol=1e-14)
-
-
-@settings(deadline=None, derandomize=True)
 @given(LAWS, HEIGHTS, st.floats(0, 1e4))
 def test_decibels_are_those_of_the_formula(law: PathGain, H: float, r: float) -> None:
     d = np.hypot(r, H)
@@ -28,7 +22,6 @@ def test_decibels_are_those_of_the_formula(law: PathGain, H: float, r: float) ->
     assert 10 * np.log10(gain) == pytest.approx(expected, abs=1e-9)
 
 
-@settings(deadline=None, derandomize=True)
 @given(LAWS, HEIGHTS, st.floats(-3, 3), st.floats(-3, 3))
 def test_slopes_are_those_of_differences(law: PathGain, H: float, x: float, y: float) -> None:
     """In units of the height, on which the law changes."""
@@ -39,20 +32,13 @@ def test_slopes_are_those_of_differences(law: PathGain, H: float, x: float, y: f
     f = law.log(squared, H)
     gradient, hessian = law.slopes(at, squared, H)
     scale = 1 + law.exponent + sum(map(abs, law.elevation_db))
-    found = h * gradient[:, 1, 1]
     expected = [(f[2, 1] - f[0, 1]) / 2, (f[1, 2] - f[1, 0]) / 2]
-    np.testing.assert_allclose(found, expected, atol=1e-10 * scale)
-    bent = h * np.stack(
-        [
-            gradient[0, 2, 1] - gradient[0, 0, 1],
-            gradient[0, 1, 2] - gradient[0, 1, 0],
-            gradient[1, 1, 2] - gradient[1, 1, 0],
-        ]
-    )
-    np.testing.assert_allclose(h**2 * hessian[:, 1, 1], bent / 2, atol=1e-12 * scale)
+    np.testing.assert_allclose(h * gradient[:, 1, 1], expected, atol=1e-10 * scale)
+    by_x, by_y = gradient[:, 2, 1] - gradient[:, 0, 1], gradient[:, 1, 2] - gradient[:, 1, 0]
+    bent = h * np.array([by_x[0], by_y[0], by_y[1]]) / 2
+    np.testing.assert_allclose(h**2 * hessian[:, 1, 1], bent, atol=1e-12 * scale)
 
 
-@settings(deadline=None, derandomize=True)
 @given(LAWS, HEIGHTS, st.floats(0.1, 1e4))
 def test_no_gain_is_beyond_those_at_the_turns(law: PathGain, H: float, farthest: float) -> None:
     turns = law.turns(farthest, H)
@@ -61,11 +47,3 @@ def test_no_gain_is_beyond_those_at_the_turns(law: PathGain, H: float, farthest:
     assert every.max() <= extreme.max() + 1e-9
     assert every.min() >= extreme.min() - 1e-9
     assert law.db(np.array(law.best_distance(farthest, H)), H) == extreme.max()
-
-
-def test_a_gain_that_is_least_overhead_is_highest_on_a_ring() -> None:
-    """Of d^-2 and -10 dB s^2 the gain has its peak where 1 = 2 κ 10 s² / 2, κ = ln 10 / 10."""
-    law = PathGain(1e-5, elevation_db=(0.0, -10.0))
-    s = np.sqrt(1 / np.log(10.0))
-    assert law.best_distance(900.0, 100.0) == pytest.approx(100 * np.sqrt(1 / s**2 - 1))
-    assert law.best_distance(50.0, 100.0) == 50.0

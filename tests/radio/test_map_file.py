@@ -1,7 +1,6 @@
 """Files of gain maps: what is read back, and what is refused."""
 
 import itertools
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from faao_mav import files
-from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.gain_map import GainMap
@@ -97,24 +94,18 @@ def test_a_map_with_an_origin_of_its_own_is_moved_as_a_whole() -> None:
         ({"east": None}, "gain_db, north in it; expected a map with east, north and gain_db or"),
         ({"gain_db": None}, "east, north in it; expected a map with"),
         ({"above_law_db": np.zeros((4, 5))}, "above_law_db, east, gain_db, north in it; expected"),
-        ({"gain_db": np.zeros((5, 4))}, r"gain_db: 1 x 5 x 4 of float64; expected 1 x 4 x 5 num"),
         ({"gain_db": np.zeros((2, 4, 5))}, r"gain_db: 2 x 4 x 5 .* \(height, north, east\)"),
         ({"gain_db": np.full((4, 5), np.inf)}, "gain_db: inf; expected -300 to 100 dB, NaN where"),
-        ({"gain_db": np.full((4, 5), -3e9)}, r"gain_db: -3e\+09; expected"),
         ({"gain_db": np.full((4, 5), "-90")}, "gain_db: 1 x 4 x 5 of <U3; expected .* numbers"),
-        ({"gain_db": np.full((4, 5), 1j)}, "gain_db: 1 x 4 x 5 of complex128; expected .* numbers"),
         ({"gain_db": np.float64(3)}, "gain_db: one of float64; expected 1 x 4 x 5 numbers"),
         ({"gain_db": np.zeros((1001, 1000)), "east": np.arange(1e3), "north": np.arange(1001.0)},
          "gain_db: 1 x 1001 x 1000 of float64; .*at most 1,000,000"),
         ({"east": np.array([0, 10, 20, 31, 40.0])}, "east: .* 0 to 40, among them 31; expected"),
         ({"east": EAST[::-1]}, "east: 5 numbers from 40 to 0.*; expected .* rise by even steps"),
-        ({"east": EAST[:1], "gain_db": np.zeros((4, 1))}, "east: 1 numbers .*at least two"),
         ({"east": EAST[:0], "gain_db": np.zeros((4, 0))}, "east: 0 numbers; expected at least two"),
         ({"east": np.where(EAST == 20, np.nan, EAST)}, "east: nan; expected -100000 to 100000 m"),
-        ({"north": np.zeros((2, 2))}, "north: 2 x 2 of float64; expected 4 numbers"),
         ({"height": np.array([60.0, 60.0]), "gain_db": np.zeros((2, 4, 5))},
          "height: 2 numbers from 60 to 60; expected numbers that rise, m"),
-        ({"height": np.array([60.0, 80.0])}, "gain_db: 1 x 4 x 5 of float64; expected 2 x 4 x 5"),
         ({"ground": np.zeros((2, 2))}, "ground: 2 x 2 of float64; expected 4 x 5 numbers"),
         ({"ground": np.full((4, 5), np.nan)}, "ground: nan; expected"),
         ({"origin": np.array([91.0, 0.0])}, "origin: .*expected latitude and longitude, degrees"),
@@ -156,9 +147,7 @@ def test_tables_that_are_no_map_are_refused(tmp_path: Path, text: str, told: str
         read_map(path)
 
 
-def test_files_that_are_no_archive_or_of_any_size_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_that_are_no_archive_are_refused(tmp_path: Path) -> None:
     for name, told in (("a.npz", "not a map"), ("a.tif", "cannot be read"), ("a.json", "ends in")):
         if name.endswith("tif"):
             pytest.importorskip("rasterio")
@@ -167,21 +156,13 @@ def test_files_that_are_no_archive_or_of_any_size_are_refused(
             read_map(tmp_path / name)
     with pytest.raises(InputError, match=r"none\.npz: cannot be read"):
         read_map(tmp_path / "none.npz")
-    monkeypatch.setattr(files, "MAX_BYTES", 1_000_000)
-    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as packed:
-        packed.writestr("gain_db.npy", bytes(2_000_000))
-    with pytest.raises(InputError, match=r"bomb\.npz: more than 1,000,000 bytes"):
-        read_map(tmp_path / "bomb.npz")
 
 
 def test_words_that_are_no_map_are_refused() -> None:
-    for word in (WORD, WORD + "AAAA", WORD + "ä", map_word(GainMap(EAST, NORTH, *rest()))[:-40]):
+    sound = map_word(GainMap(EAST, NORTH, np.array([60.0]), np.zeros((1, 4, 5))))
+    for word in (WORD, WORD + "AAAA", WORD + "ä", sound[:-40]):
         with pytest.raises(InputError, match=r"not the numbers of a map|missing"):
             map_of_word(word)
-
-
-def rest() -> tuple[Real, Real]:
-    return np.array([60.0]), np.zeros((1, 4, 5))
 
 
 def test_a_geotiff_of_any_projection_becomes_a_local_grid(tmp_path: Path) -> None:

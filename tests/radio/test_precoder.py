@@ -1,21 +1,14 @@
+from itertools import product
+
 import numpy as np
 import pytest
-from closed_forms import bpsk_two_antennas_rate, channel, power_of
-from hypothesis import given, settings
+from closed_forms import channel, power_of
+from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.arrays import RealOrComplex
 from faao_mav.errors import InputError
-from faao_mav.radio.constellation import difference_classes
-from faao_mav.radio.precoder import (
-    SCHEMES,
-    bpsk_two_antennas,
-    mmse,
-    mrt,
-    waterfilling,
-    zf,
-)
-from faao_mav.radio.rate import cutoff_rate
+from faao_mav.radio.precoder import SCHEMES, mmse, mrt, waterfilling, zf
 
 SHAPES = [(1, 1), (2, 2), (3, 3), (1, 2), (2, 3), (2, 1), (4, 2), (3, 2)]
 
@@ -26,15 +19,14 @@ def parallel(A: RealOrComplex, B: RealOrComplex) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize(("receive", "transmit"), SHAPES)
-@pytest.mark.parametrize("scale", [1e-8, 1.0, 1e5])
-def test_shape_power_and_batches(scheme: str, receive: int, transmit: int, scale: float) -> None:
-    H = scale * channel(1, 3, 4, receive, transmit)
-    P = SCHEMES[scheme](H, 0.1, 1e-3)
-    assert P.shape == (3, 4, transmit, transmit)
-    assert P.dtype == np.complex128
-    np.testing.assert_allclose(power_of(P), 0.1, rtol=1e-12)
-    np.testing.assert_allclose(SCHEMES[scheme](H[1, 2], 0.1, 1e-3), P[1, 2], atol=1e-12)
+def test_shape_power_and_batches(scheme: str) -> None:
+    for (receive, transmit), scale in product(SHAPES, (1e-8, 1.0, 1e5)):
+        H = scale * channel(1, 3, 4, receive, transmit)
+        P = SCHEMES[scheme](H, 0.1, 1e-3)
+        assert P.shape == (3, 4, transmit, transmit)
+        assert P.dtype == np.complex128
+        np.testing.assert_allclose(power_of(P), 0.1, rtol=1e-12)
+        np.testing.assert_allclose(SCHEMES[scheme](H[1, 2], 0.1, 1e-3), P[1, 2], atol=1e-12)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -72,7 +64,6 @@ def test_mmse_lies_between_maximum_ratio_and_zero_forcing(receive: int, transmit
         parallel(mmse(H, 2.0, 0.7), H.conj().T @ inverse)
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.integers(0, 10_000), st.sampled_from(SHAPES), st.floats(-3.0, 4.0))
 def test_waterfilling_meets_the_optimality_conditions(
     seed: int, shape: tuple[int, int], exponent: float
@@ -91,29 +82,10 @@ def test_waterfilling_meets_the_optimality_conditions(
     assert np.all(floor[~used] >= level[0] * (1 - 1e-9))
 
 
-@settings(deadline=None, derandomize=True)
-@given(st.integers(0, 10_000), st.sampled_from([1, 2, 3]), st.floats(-3.0, 2.5))
-def test_closed_form_is_never_beaten(seed: int, receive: int, exponent: float) -> None:
-    H, noise = channel(seed, receive, 2), 10.0**-exponent
-    classes = difference_classes("bpsk", 2)
-    best = cutoff_rate(H, bpsk_two_antennas(H, 2.0), classes, noise)
-    assert bpsk_two_antennas_rate(H, 2.0, noise) == pytest.approx(best, rel=1e-9)
-    others = channel(seed + 1, 200, 2, 2)
-    others *= np.sqrt(2.0 / power_of(others))[:, None, None]
-    assert np.max(cutoff_rate(H, others, classes, noise)) <= best * (1 + 1e-12)
-    # nor by small changes of it
-    near = bpsk_two_antennas(H, 2.0) + 0.05 * channel(seed + 2, 200, 2, 2)
-    near *= np.sqrt(2.0 / power_of(near))[:, None, None]
-    assert np.max(cutoff_rate(H, near, classes, noise)) <= best * (1 + 1e-12)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_power_must_be_positive(scheme: str) -> None:
-    with pytest.raises(InputError, match="power"):
-        SCHEMES[scheme](np.eye(2), 0.0, 1.0)
-
-
-def test_what_else_is_refused() -> None:
+def test_what_is_refused() -> None:
+    for scheme in SCHEMES.values():
+        with pytest.raises(InputError, match="power"):
+            scheme(np.eye(2), 0.0, 1.0)
     for scheme in (mmse, waterfilling):
         with pytest.raises(InputError, match="noise"):
             scheme(np.eye(2), 1.0, 0.0)

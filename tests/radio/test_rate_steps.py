@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.radio.rate_steps import RateSteps, one_stream
@@ -11,7 +11,6 @@ ROWS = st.lists(st.tuples(st.floats(-20, 40), st.floats(0.01, 10)), min_size=1, 
 SNR = 10 ** np.linspace(-4, 6, 2001)
 
 
-@settings(deadline=None, derandomize=True)
 @given(ROWS, st.floats(0.1, 8))
 def test_steps_and_what_rises_about_them(rows: list[tuple[float, float]], width: float) -> None:
     snr_db, rates = zip(*rows, strict=True)
@@ -29,7 +28,6 @@ def test_steps_and_what_rises_about_them(rows: list[tuple[float, float]], width:
     assert sums[0] == pytest.approx(sums[1], abs=2 * step * steps.most)
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.integers(1, 4), st.integers(1, 4), st.integers(1, 3), st.integers(0, 2**31))
 def test_no_stream_is_stronger(receive: int, transmit: int, draws: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
