@@ -118,7 +118,7 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
 def _rate(problem: Problem, flight: Trajectory, precoders: Sequence[Complex]) -> float:
     """Return R_avg of (9), bit/s/Hz."""
     return min(
-        float(link.rates(flight.w, link.small_scale(flight.w), P).mean())
+        float(link.mean_rates(link.channel(flight.w), P).mean())
         for link, P in zip(problem.links, precoders, strict=True)
     )
 

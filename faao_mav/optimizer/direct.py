@@ -260,10 +260,8 @@ def _under_shadowing(problem: Problem, field: RateField, optimum: LocalOptimum) 
 
 def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
     """Return what `problem` maximises, bit/s/Hz, at positions w (n, 2) with both `precoders`."""
-    rates = [
-        link.rates(w, link.small_scale(w), P)
-        for link, P in zip(problem.links, precoders, strict=True)
-    ]
+    links = zip(problem.links, precoders, strict=True)
+    rates = [link.mean_rates(link.channel(w), P) for link, P in links]
     return objective(np.stack(rates), problem.kinematics, problem.maximised_queue)
 
 

@@ -131,10 +131,6 @@ class Link:
         H_r = self.small_scale(w) if H_r is None else H_r
         return np.sqrt(self.gains.gain(w.T))[:, None, None] * H_r
 
-    def rates(self, w: Real, H_r: Complex, P: Complex) -> Real:
-        """Return the rate of every slot, bits (N + 2,), its mean where H_r has draws."""
-        return self.mean_rates(self.channel(w, H_r), P)
-
     def mean_rates(self, H: Complex, P: Complex) -> Real:
         """Return the rates of `draw_rates`, bits (...), their mean where H has draws."""
         rates = self.draw_rates(H, P)

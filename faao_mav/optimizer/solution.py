@@ -224,9 +224,10 @@ class Solution:
     def recomputed_slots(self, power: float = 1.0) -> tuple[Real, Real]:
         """Return I_U, I_G from w, the fading and the precoders alone, all powers times `power`."""
         problem, scale = self.problem, np.sqrt(power)
+        near, far = problem.links
         return (
-            problem.bs_uav.rates(self.w, self.H_rB, scale * self.P_B),
-            problem.uav_user.rates(self.w, self.H_rU, scale * self.P_U),
+            near.mean_rates(near.channel(self.w, self.H_rB), scale * self.P_B),
+            far.mean_rates(far.channel(self.w, self.H_rU), scale * self.P_U),
         )
 
     def recomputed(self, power: float = 1.0) -> Rates:
@@ -281,7 +282,7 @@ def make_solution(
     """Put an iterate together with its fading and rates."""
     fading = [link.small_scale(flight.w) for link in problem.links]
     I_U, I_G = (
-        link.rates(flight.w, H_r, P)
+        link.mean_rates(link.channel(flight.w, H_r), P)
         for link, H_r, P in zip(problem.links, fading, precoders, strict=True)
     )
     return Solution(

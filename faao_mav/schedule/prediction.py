@@ -91,7 +91,7 @@ def rates_along(
     at = np.arange(len(w)) if only is None else only
     of = at if slots is None else slots[at]
     I_U, I_G = (
-        link.mean_rates(link.channel(w, link.small_scale(w))[..., at, :, :], P[..., of, :, :])
+        link.mean_rates(link.channel(w)[..., at, :, :], P[..., of, :, :])
         for link, P in zip(solution.problem.links, (solution.P_B, solution.P_U), strict=True)
     )
     return I_U, I_G

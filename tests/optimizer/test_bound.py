@@ -30,7 +30,7 @@ FAINT = {
 def best_rate(problem: Problem, w: Real) -> float:
     means = []
     for link in problem.links:
-        H = link.channel(w, link.small_scale(w))
+        H = link.channel(w)
         means.append(link.draw_rates(H, link.best(H[:, None])).mean())
     return float(min(means))
 
@@ -125,7 +125,7 @@ def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> N
         link = problem.uav_user
         w = link.gains.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
         values, exact = best_at(problem, link, link.gains.log(w.T)[:, None])
-        H = link.channel(w, link.small_scale(w))
+        H = link.channel(w)
         true = link.draw_rates(H, link.best(H[:, None]))
         assert exact
         assert (values[:, 0] >= true - 1e-6).all()

@@ -73,7 +73,7 @@ def test_it_is_never_below_the_plan_for_the_cutoff_rate(
     assert solution.rates.R_avg > before.rates.R_avg  # of the same flight it would be above too
     problem = build_problem(plan)
     rates = [
-        link.rates(before.w, H_r, P)
+        link.mean_rates(link.channel(before.w, H_r), P)
         for link, H_r, P in zip(
             problem.links, (before.H_rB, before.H_rU), (before.P_B, before.P_U), strict=True
         )
@@ -107,7 +107,7 @@ def test_mutual_information_is_delivered_too(
     solution = optimize(plan_of(small_plan, fading | changes))
     information, problem = price(solution), solution.problem
     I_U, I_G = (
-        replace(link, measure="mutual_information").rates(solution.w, H_r, P)
+        replace(link, measure="mutual_information").mean_rates(link.channel(solution.w, H_r), P)
         for link, H_r, P in zip(
             problem.links, (solution.H_rB, solution.H_rU), (solution.P_B, solution.P_U), strict=True
         )

@@ -130,7 +130,7 @@ def test_steps_of_a_radio_that_rise_are_one_table(
 
 
 def exactly(link: Link, wanted: Design, w: Real) -> Real:
-    H = link.channel(w, link.small_scale(w))
+    H = link.channel(w)
     return wanted.rate(link, H, wanted.precoders(link, H))
 
 
@@ -170,7 +170,7 @@ def test_tables_hold_the_rate_at_every_place(
             P = rate.initial_precoders(*coordinates(link, w))
             assert P is not None
             P *= np.sqrt(link.power) / np.linalg.norm(P, axis=(-2, -1), keepdims=True)
-            assert link.rates(w, link.small_scale(w), P) == pytest.approx(exact, abs=2e-3)
+            assert link.mean_rates(link.channel(w), P) == pytest.approx(exact, abs=2e-3)
 
         def value(at: Real, rate: RateModel = rate, link: Link = link) -> Real:
             return rate.value(*coordinates(link, at))
@@ -197,7 +197,7 @@ def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precode
     rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
     assert isinstance(rate, TableRate)
     at = coordinates(link, w)
-    H = link.channel(w, link.small_scale(w))
+    H = link.channel(w)
     P = rate.initial_precoders(*at) if wanted.optimal else wanted.precoders(link, H)
     assert rate.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
     gradient, hessian = derivatives(link, rate, w)
