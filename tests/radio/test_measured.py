@@ -59,7 +59,7 @@ def test_counts_of_a_device_are_calibrated(tmp_path: Path) -> None:
     for units, calibration, level in (
         (sik, (), 100 / 1.9 - 127),
         (sik, [(119, -50)], -60.0),
-        (raw, [(0, -120), (200, -20)], -70.0),
+        (raw, [(20, -110), (200, -20)], -70.0),
     ):
         found = read_measured(path, STATION, units, calibration)
         np.testing.assert_allclose(found.samples.level, level)
