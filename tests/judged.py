@@ -29,7 +29,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.item import Home, Mission, MissionItem
-from faao_mav.plan.energy import Battery
+from faao_mav.plan.vehicle import Battery
 from faao_mav.validate import Finding, Level, Limits, LinkCheck, ValidationContext, validate
 from faao_mav.validate.demands import EnergyUse
 

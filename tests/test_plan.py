@@ -1,6 +1,7 @@
 """`plan.yaml`: what is read, and what bad input gets."""
 
 import copy
+import json
 import math
 import pickle
 from dataclasses import replace
@@ -149,7 +150,7 @@ def test_several_inclusions_mean_what_the_autopilot_makes_of_them() -> None:
     ]  # fmt: skip
 
 
-def test_a_plan_stands_without_the_file_of_its_fence() -> None:
+def test_a_plan_stands_without_the_file_of_its_fence(tmp_path: Path) -> None:
     place = {"latitude": 47.3965, "longitude": 8.5435, "elevation": 0}
     path = "tests/data/missions/fence_and_rally.plan"
     plan = parse_plan(edited(SMALL, {"site.origin": place, "fence": {"file": path, "margin": 2}}))
@@ -160,6 +161,16 @@ def test_a_plan_stands_without_the_file_of_its_fence() -> None:
     assert again.keep_in is not None
     assert plan.keep_in is not None
     assert again.keep_in.shape.symmetric_difference(plan.keep_in.shape).area < 1e-3
+    square = [[8.54, 47.39], [8.55, 47.39], [8.55, 47.4], [8.54, 47.4]]
+    drawn = {
+        "type": "Feature",
+        "properties": {"name": "field"},
+        "geometry": {"type": "MultiPolygon", "coordinates": [[square], []]},
+    }
+    (tmp_path / "drawn.geojson").write_text(json.dumps(drawn))
+    beside = {"site.origin": place, "fence": {"file": "drawn.geojson", "margin": 2}}
+    plan = parse_plan(edited(SMALL, beside), str(tmp_path / "plan.yaml"))
+    assert plan.geofence.notes == ("geometry 'field': a polygon without corners, passed over",)
 
 
 def test_a_relay_is_causal_unless_the_plan_says_otherwise() -> None:

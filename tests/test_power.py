@@ -13,7 +13,7 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import Vehicle
 from faao_mav.mission import Mission
 from faao_mav.plan import parse_plan
-from faao_mav.plan.energy import PowerOptions
+from faao_mav.plan.vehicle import PowerOptions
 from faao_mav.power import FixedWing, PowerModel, RotaryWing
 from faao_mav.validate import Finding, ValidationContext, validate
 from faao_mav.validate.demands import EnergyUse, energy_use

@@ -20,7 +20,7 @@ from faao_mav.optimizer.rough import RoughFlight, rough_flight
 from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
-from faao_mav.plan.zones import PolygonZone
+from faao_mav.plan.sections import PolygonZone
 from faao_mav.report.figures import of_a_slot
 from faao_mav.report.maps import WAYPOINTS, placed_items
 from faao_mav.report.page import write_part

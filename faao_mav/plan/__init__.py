@@ -1,6 +1,6 @@
 """The plan: `plan.yaml` read, checked and turned into SI units.
 
-`sections`, `radio` and `zones` declare the keys and what they mean, `model` has the whole plan,
+`sections`, `vehicle` and `radio` declare the keys and what they mean, `model` has the whole plan,
 `reader` reads it, `keys.reference` lists them.
 """
 
@@ -17,6 +17,6 @@ from faao_mav.plan.sections import MissionOptions as MissionOptions
 from faao_mav.plan.sections import Optimizer as Optimizer
 from faao_mav.plan.sections import Origin as Origin
 from faao_mav.plan.sections import Site as Site
-from faao_mav.plan.sections import VehicleOptions as VehicleOptions
 from faao_mav.plan.sections import Wind as Wind
+from faao_mav.plan.vehicle import VehicleOptions as VehicleOptions
 from faao_mav.vector import Vector as Vector

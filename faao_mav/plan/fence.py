@@ -12,7 +12,7 @@ from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE
 from faao_mav.plan.model import PlanContents, PlanFile
-from faao_mav.plan.zones import CircleZone, FenceOptions, PolygonZone
+from faao_mav.plan.sections import CircleZone, FenceOptions, PolygonZone
 from faao_mav.vector import Vector
 
 _SHORTER_WAY = 2e-3
@@ -43,7 +43,8 @@ def geofence(contents: PlanFile, source: str) -> Fence:
         if isinstance(zone, CircleZone)
     ]
     try:
-        fence = Fence((*polygons, *of_file.polygons), (*circles, *of_file.circles))
+        areas = (*polygons, *of_file.polygons), (*circles, *of_file.circles)
+        fence = Fence(*areas, notes=of_file.notes)
     except InputError as error:
         raise PlanError(f"{source}: {error}") from None
     if not fence:

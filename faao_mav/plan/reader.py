@@ -20,8 +20,8 @@ from faao_mav.plan.checks import problems
 from faao_mav.plan.fence import geofence, written_out
 from faao_mav.plan.keys import PlanKey, reference
 from faao_mav.plan.model import PlanContents, PlanFile
+from faao_mav.plan.sections import CHOICES
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
-from faao_mav.plan.zones import CHOICES
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.map_file import MAX_WORD, map_word
 

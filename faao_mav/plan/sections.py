@@ -1,35 +1,31 @@
-"""What the plan says of site, vehicle, flight, optimiser, goal, mission and study."""
+"""What the plan says of site, flight, optimiser, goal, fence, mission and study."""
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, fields
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
 from pydantic import (
     AfterValidator,
+    Discriminator,
     Field,
     PlainValidator,
+    Tag,
     TypeAdapter,
     ValidationError,
     ValidationInfo,
 )
 from pydantic_core import PydanticCustomError
 
-from faao_mav.autopilot import autopilots, kinds, vehicle_type
-from faao_mav.autopilot.body import Body, CopterBody, PlaneBody
-from faao_mav.errors import InputError
-from faao_mav.plan.energy import Battery, PowerOptions
 from faao_mav.plan.fields import (
+    MAX_LOCAL_DISTANCE,
     Flag,
     Number,
     Position,
+    Text,
     Velocity,
     Whole,
-    Written,
     check_degrees,
     key,
-    listed,
-    one_of,
     section,
     told,
 )
@@ -91,69 +87,6 @@ class Site:
 
     origin: Annotated[Origin, AfterValidator(_keep)]
     wind: Wind = Wind(speed=0.0, from_degrees=0.0)
-
-
-AutopilotName: TypeAlias = Annotated[str, one_of(autopilots), Written(lambda: listed(autopilots()))]
-KindName: TypeAlias = Annotated[str, one_of(kinds), Written(lambda: listed(kinds()))]
-
-
-def _body_of(value: object, info: ValidationInfo) -> Body | None:
-    """Return `vehicle.body` of a plan: numbers over those of the simulator; None where all are."""
-    try:
-        known = vehicle_type(info.data.get("autopilot", ""), info.data.get("type", ""))
-    except InputError:  # an unknown name is told by itself
-        return None
-    if value in (None, "sitl"):
-        return None
-    if not isinstance(value, dict):
-        raise ValueError("neither sitl nor a mapping")
-    if known.body is None:
-        raise told(f"no flight model of {known.family.key} {known.kind} reads it; give sitl")
-    own: dict[str, Any] = asdict(known.body)
-    if other := [name for name in value if name in _NUMBERS and name not in own]:
-        raise told(f"{other[0]} is not of a {known.kind}'s body, which has {listed([*own], 'and')}")
-    body = TypeAdapter(type(known.body)).validate_python({**own, **value})
-    return body if body != known.body else None
-
-
-_NUMBERS = {each.name for body in (CopterBody, PlaneBody) for each in fields(body)}
-"""The names of all numbers of all airframes."""
-
-
-@section
-class VehicleOptions:
-    """The aircraft and its limits."""
-
-    autopilot: AutopilotName = key("The autopilot that the mission is for.", default="ardupilot")
-    type: KindName = key("The kind of aircraft; a plane with ArduPilot.", default="copter")
-    max_speed: Number = key(
-        "Largest speed v_max, over the ground; of a plane, through the air.", "(0, 1000] m/s"
-    )
-    max_acceleration: Number = key("Largest acceleration a_max.", "(0, 1000] m/s^2")
-    min_speed: Number = key(
-        "Least speed v_min through the air: above 0 both ends are free or velocities.",
-        "[0, 1000] m/s",
-        "a speed from 0 m/s, below max_speed",
-        default=0.0,
-    )
-    max_airspeed: Number | None = key(
-        "Largest airspeed of a plan with a wind; null: what the vehicle holds, for a plane "
-        "max_speed.",
-        "(0, 1000] m/s",
-        default=None,
-    )
-    parameters: Mapping[str, Number] = key(
-        "Parameters of the autopilot, in its own units, that the flight is predicted with.",
-        accepted="autopilot parameters as NAME: number",
-        default_factory=dict,
-    )
-    body: Annotated[Body | None, PlainValidator(_body_of)] = key(
-        "The airframe that flights are predicted with: numbers over those of the simulator's.",
-        accepted="sitl, the airframe of the autopilot's simulator, or a mapping of its numbers",
-        default=None,
-    )
-    power: PowerOptions | None = None
-    battery: Battery | None = None
 
 
 class Heights(NamedTuple):
@@ -285,6 +218,74 @@ class Goal:
     def counts_energy(self) -> bool:
         """Whether the energy of the flight has a part in the goal."""
         return self.minimise == "energy" or self.maximise == "data"
+
+
+@section
+class CircleZone:
+    """A circle of the fence."""
+
+    center: Position = key("Centre of the circle.", "m")
+    radius: Number = key("Radius of the circle.", "m", gt=0, le=MAX_LOCAL_DISTANCE)
+
+
+@section
+class PolygonZone:
+    """A polygon of the fence."""
+
+    polygon: tuple[Position, ...] = key("Corners.", "m", "three corners or more", min_length=3)
+
+
+CHOICES = ("<circle>", "<polygon>", "<corners>", "<zones>")
+"""What pydantic puts into the place of an error for the choice among several types."""
+
+
+def _zone(value: object) -> str:
+    return "<polygon>" if isinstance(value, dict) and "polygon" in value else "<circle>"
+
+
+def _corners_or_zones(value: object) -> str:
+    zones = isinstance(value, list | tuple) and any(
+        isinstance(each, dict) and not {"latitude", "longitude"} & set(each) for each in value
+    )
+    return "<zones>" if zones else "<corners>"
+
+
+def _one_polygon(corners: tuple[Vector, ...]) -> tuple[PolygonZone, ...]:
+    return (PolygonZone(polygon=corners),) if corners else ()
+
+
+Zone: TypeAlias = Annotated[
+    Annotated[CircleZone, Tag("<circle>")] | Annotated[PolygonZone, Tag("<polygon>")],
+    Discriminator(_zone),
+]
+Zones: TypeAlias = tuple[Zone, ...]
+_OnePolygon: TypeAlias = Annotated[
+    tuple[Position, ...], Field(min_length=3), AfterValidator(_one_polygon)
+]
+
+
+@section
+class FenceOptions:
+    """Where the aircraft may be: it stays inside the inclusions and out of the exclusions."""
+
+    inclusion: Annotated[
+        Annotated[_OnePolygon, Tag("<corners>")] | Annotated[Zones, Tag("<zones>")],
+        Discriminator(_corners_or_zones),
+    ] = key(
+        "Area to stay in; of several zones PX4 asks for any, ArduPilot for all.",
+        "m",
+        "three corners or more, or a list of {center, radius} and {polygon}",
+        default=(),
+    )
+    exclusion: Zones = key(
+        "Zones to stay out of.", accepted="a list of {center, radius} and {polygon}", default=()
+    )
+    file: Text | None = key(
+        "File with more zones, beside the plan's file or by its whole path.",
+        accepted="the name of a .plan, .kml or .geojson file",
+        default=None,
+    )
+    margin: Number = key("Distance that the plan keeps from the edge.", "[0, 10000] m", default=5.0)
 
 
 @section

@@ -15,7 +15,7 @@ from faao_mav.autopilot import Track
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.plan.ground import in_ground
+from faao_mav.plan.model import in_ground
 from faao_mav.schedule.prediction import Prediction, rates_along
 from faao_mav.schedule.route import begins_at_speed
 from faao_mav.schedule.schedule import passing

@@ -9,7 +9,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan, Radio, Vector
-from faao_mav.plan.energy import Battery
+from faao_mav.plan.vehicle import Battery
 from faao_mav.power import JOULES_PER_WH
 
 ELSEWHERE = 2_000.0

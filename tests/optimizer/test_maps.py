@@ -31,7 +31,7 @@ from faao_mav.optimizer.search.queue_sweep import QueueSweep
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
 from faao_mav.plan import Plan, parse_plan
-from faao_mav.plan.ground import ground_areas, in_ground
+from faao_mav.plan.model import ground_areas, in_ground
 from faao_mav.radio.gain_map import GainMap, Grid
 from faao_mav.radio.map_file import map_archive
 from faao_mav.radio.relay import RelayQueue
