@@ -1,18 +1,15 @@
 """Plans and trajectories for the tests of missions."""
 
-from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 import numpy as np
+from conftest import FLYABLE, edited
 from hypothesis import settings
 
 from faao_mav.arrays import Real
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Frame, Mission
-from faao_mav.plan import (
-    Plan,
-)
+from faao_mav.plan import Plan, parse_plan
 from faao_mav.schedule import Conversion, convert
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.route import initial_route
@@ -23,50 +20,25 @@ STEADY = settings(derandomize=True, deadline=None, max_examples=80)
 Trajectory: TypeAlias = tuple[Real, Real]
 
 
-def plan_with(
-    *,
-    origin: tuple[float, float, float] = (-35.363262, 149.165237, 584.0),
-    autopilot: Any = "ardupilot",
-    max_speed: float = 8.0,
-    parameters: Mapping[str, float] | None = None,
-    takeoff: bool = True,
-    on_finish: Any = "rtl",
-    path_tolerance: float = 2.0,
-    max_items: int = 600,
-    recommend: bool = False,
-) -> Plan:
-    """Return a plan; the radio and the flight's ends play no part in a mission."""
-    latitude, longitude, elevation = origin
-    return Plan.from_dict({
-        "site": {"origin": {"latitude": latitude, "longitude": longitude, "elevation": elevation}},
-        "vehicle": {
-            "max_speed": max_speed,
-            "max_acceleration": 1.5,
-            "autopilot": autopilot,
-            "parameters": dict(parameters or {}),
-        },
-        "flight": {
-            "start": [0, 350],
-            "end": [350, 0],
-            "altitude": 100,
-            "duration": 120,
-            "start_velocity": "free",
-            "end_velocity": "free",
-        },
-        "radio": {
-            "base_station": {"position": [0, 0]},
-            "ground_user": {"position": [300, 300]},
-            "fading": "none",
-        },
-        "optimizer": {"starts": ["straight"]},
-        "mission": {
-            "takeoff": takeoff,
-            "on_finish": on_finish,
-            "path_tolerance": path_tolerance,
-            "max_items": max_items,
-            "parameters": "recommend" if recommend else "keep",
-        },
-    })  # fmt: skip
+def plan_with(*, recommend: bool = False, **changes: Any) -> Plan:
+    """Return a plan with values of its vehicle and mission by their keys.
+
+    The radio and the flight's ends play no part in a mission.
+    """
+    values: dict[str, Any] = {
+        "vehicle": {"max_speed": 8.0, "max_acceleration": 1.5},
+        "flight.start": [0, 350],
+        "flight.end": [350, 0],
+        "flight.altitude": 100,
+        "flight.duration": 120,
+        "flight.start_velocity": "free",
+        "flight.end_velocity": "free",
+        "mission.parameters": "recommend" if recommend else "keep",
+    }
+    for key, value in changes.items():
+        of_vehicle = key in ("autopilot", "type", "max_speed", "min_speed", "parameters")
+        values[f"{'vehicle' if of_vehicle else 'mission'}.{key}"] = value
+    return parse_plan(edited(FLYABLE, values))
 
 
 def dash(begin: float, end: float, top: float, acceleration: float, t: Real) -> Real:
@@ -142,6 +114,5 @@ def items_of(mission: Mission, plan: Plan) -> tuple[Real, list[float], list[floa
         before = item.command
     assert before in (Command.NAV_WAYPOINT, Command.NAV_DELAY)
     assert speeds[0] == plan.vehicle.max_speed
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    positions = frame.to_local([p.x for p in points], [p.y for p in points])
+    positions = plan.origin.frame.to_local([p.x for p in points], [p.y for p in points])
     return positions, speeds[1:], holds

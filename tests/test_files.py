@@ -21,18 +21,19 @@ from faao_mav.files import (
 
 
 def test_content_arrives_and_replaces(tmp_path: Path) -> None:
-    path = tmp_path / "file.txt"
-    write_whole(path, b"one")
-    write_whole(path, b"two")
-    assert path.read_bytes() == b"two"
-    assert list(tmp_path.iterdir()) == [path]
-    assert path.stat().st_mode & 0o777 == 0o666 & ~_umask()
-
-
-def _umask() -> int:
-    mask = os.umask(0)
+    (tmp_path / "below").mkdir()
+    longest, link, real = tmp_path / ("a" * 255), tmp_path / "link", tmp_path / "below" / "real"
+    link.symlink_to(real)
+    mask = os.umask(0o027)
+    for path in (longest, link):
+        for content in (b"one", b"two"):
+            check_writable(path)
+            write_whole(path, content)
+            assert path.read_bytes() == content
     os.umask(mask)
-    return mask
+    assert link.is_symlink()
+    assert {*tmp_path.iterdir()} == {longest, link, real.parent}
+    assert [each.stat().st_mode & 0o777 for each in (longest, real)] == [0o640, 0o640]
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(
@@ -69,48 +70,24 @@ def test_what_is_added_is_added_whole_or_not_at_all(tmp_path: Path) -> None:
             append_whole(full, b"x")
 
 
-def test_places_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no directory"):
-        check_writable(tmp_path / "absent" / "file.txt")
-    with pytest.raises(InputError, match="is a directory"):
-        check_writable(tmp_path)
+def test_what_is_no_place_for_a_file_or_no_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")  # opening it would wait for a writer
+    for path, told in (
+        (tmp_path / "absent" / "file.txt", "there is no directory"),
+        (tmp_path, "is a directory"),
+        (tmp_path / ("a" * 300), "cannot be written: File name too long"),
+        (tmp_path / "pipe", "is a device or a pipe"),
+        (Path("/dev/null"), "is a device or a pipe"),
+    ):
+        with pytest.raises(InputError, match=told):
+            check_writable(path)
+        if "device" in told:
+            with pytest.raises(PlanError, match=f"{told}; give the name of a file"):
+                read_text(path, 1000, "a plan", PlanError)
     with pytest.raises(InputError, match="cannot be written"):
         write_whole(tmp_path / "absent" / "file.txt", b"")
     check_writable(tmp_path / "file.txt")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_names_that_are_no_place_for_a_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be written: File name too long"):
-        check_writable(tmp_path / ("a" * 300))
-    os.mkfifo(tmp_path / "pipe")
-    for path in (tmp_path / "pipe", Path("/dev/null")):
-        with pytest.raises(InputError, match="is a device or a pipe"):
-            check_writable(path)
-
-
-def test_what_is_no_file_is_not_read(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")  # opening it would wait for a writer
-    for path in (tmp_path / "pipe", Path("/dev/null")):
-        with pytest.raises(PlanError, match="is a device or a pipe; give the name of a file"):
-            read_text(path, 1000, "a plan", PlanError)
-
-
-def test_the_longest_name_that_there_is(tmp_path: Path) -> None:
-    path = tmp_path / ("a" * 255)
-    check_writable(path)
-    write_whole(path, b"whole")
-    assert path.read_bytes() == b"whole"
-
-
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
-    (tmp_path / "below").mkdir()
-    link, real = tmp_path / "link.txt", tmp_path / "below" / "real.txt"
-    real.write_bytes(b"old")
-    link.symlink_to(real)
-    write_whole(link, b"new")
-    assert link.is_symlink()
-    assert real.read_bytes() == b"new"
+    assert [each.name for each in tmp_path.iterdir()] == ["pipe"]
 
 
 def test_no_file_is_written_over_another_of_the_same_command(tmp_path: Path) -> None:
@@ -134,15 +111,20 @@ def test_files_that_belong_together_are_written_all_or_none(tmp_path: Path) -> N
     assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == [b"1", b"2"]
 
 
-def test_standard_input_is_a_file_to_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\xef\xbb\xbfname: x")))
-    assert read_text("-", 100, "a plan", PlanError) == "name: x"
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"x" * 101)))
-    with pytest.raises(PlanError, match="-: more than 100 bytes; expected a plan"):
-        read_text("-", 100, "a plan", PlanError)
-
-
-def test_the_place_of_a_byte_that_is_no_text_counts_the_mark_before_it(tmp_path: Path) -> None:
-    (tmp_path / "plan").write_bytes(b"\xef\xbb\xbfa: 1\nb: \xff\n")
-    with pytest.raises(PlanError, match="plan: line 2: byte 0xff is not UTF-8"):
-        read_text(tmp_path / "plan", 100, "a plan", PlanError)
+def test_text_is_utf_8_within_a_limit_also_from_standard_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for content, told in (
+        (b"\xef\xbb\xbfname: x", None),
+        (b"x" * 101, "more than 100 bytes; expected a plan"),
+        (b"\xef\xbb\xbfa: 1\nb: \xff\n", "line 2: byte 0xff is not UTF-8"),
+    ):
+        path = tmp_path / "plan"
+        path.write_bytes(content)
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+        for name in (str(path), "-"):
+            if told is None:
+                assert read_text(name, 100, "a plan", PlanError) == "name: x"
+                continue
+            with pytest.raises(PlanError, match=f"{name}: {told}"):
+                read_text(name, 100, "a plan", PlanError)

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
 
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 
-STEADY = settings(derandomize=True, deadline=None)
 GEOD = Geod(ellps="WGS84")
 
 latitudes = st.floats(-90, 90)
@@ -17,7 +16,6 @@ longitudes = st.floats(-180, 180)
 metres = st.floats(-100_000, 100_000)
 
 
-@STEADY
 @given(latitudes, longitudes, metres, metres)
 def test_there_and_back_is_the_same_place(
     latitude: float, longitude: float, east: float, north: float
@@ -31,7 +29,6 @@ def test_there_and_back_is_the_same_place(
     assert -90 <= there[0] <= 90
 
 
-@STEADY
 @given(st.floats(-89, 89), longitudes, st.floats(0.1, 100_000), st.floats(0, 2 * np.pi))
 def test_distance_and_azimuth_from_the_origin_are_geodesic(
     latitude: float, longitude: float, distance: float, azimuth: float
@@ -56,31 +53,20 @@ def test_one_metre_at_the_equator_and_at_45_degrees() -> None:
     assert lat[1] - 45 == pytest.approx(1 / 111_131.7774, rel=1e-7)
 
 
-def test_shapes_follow_the_input() -> None:
-    frame = LocalFrame(47.4, 8.5)
-    lat, lon = frame.to_geodetic(np.zeros((3, 4, 2)))
-    assert lat.shape == lon.shape == (3, 4)
-    assert frame.to_local(lat, lon).shape == (3, 4, 2)
-    assert frame.to_local(47.4, [8.5, 8.6]).shape == (2, 2)
-    lat, lon = frame.to_geodetic([0.0, 0.0])
-    assert lat.shape == lon.shape == ()
-    assert (float(lat), float(lon)) == pytest.approx((47.4, 8.5), abs=1e-12)
-
-
-@pytest.mark.parametrize("longitude", [180.0, -180.0, 179.9999])
-def test_the_antimeridian_is_no_edge(longitude: float) -> None:
-    frame = LocalFrame(-17.0, longitude)
-    _, lon = frame.to_geodetic([[-500.0, 0.0], [500.0, 0.0]])
-    assert lon[0] > 179
-    assert lon[1] < -179
-    assert frame.to_local(-17.0, lon)[:, 0] == pytest.approx([-500, 500], abs=0.01)
-
-
-@pytest.mark.parametrize("pole", [90.0, -90.0])
-def test_at_the_poles_distances_still_hold(pole: float) -> None:
-    lat, lon = LocalFrame(pole, 0.0).to_geodetic([[0.0, 0.0], [300.0, 400.0]])
-    assert lat[0] == pole
-    assert GEOD.inv(0.0, pole, lon[1], lat[1])[2] == pytest.approx(500.0, abs=1e-6)
+def test_the_antimeridian_and_the_poles_are_no_edges_whatever_the_shape() -> None:
+    sides = np.array([[[-500.0, 0.0], [500.0, 0.0]]])
+    for longitude in (180.0, -180.0, 179.9999):
+        frame = LocalFrame(-17.0, longitude)
+        lat, lon = frame.to_geodetic(sides)
+        assert lon[0, 0] > 179
+        assert lon[0, 1] < -179
+        assert frame.to_local(-17.0, lon) == pytest.approx(sides, abs=0.01)
+        assert lat.shape == lon.shape == (1, 2)
+    for pole in (90.0, -90.0):
+        lat, lon = LocalFrame(pole, 0.0).to_geodetic([[0.0, 0.0], [300.0, 400.0]])
+        assert lat[0] == pole
+        assert GEOD.inv(0.0, pole, lon[1], lat[1])[2] == pytest.approx(500.0, abs=1e-6)
+        assert LocalFrame(pole, 0.0).to_geodetic([0.0, 0.0])[0].shape == ()
 
 
 @pytest.mark.parametrize("origin", [(90.1, 0.0), (np.nan, 0.0), (0.0, np.inf)])

@@ -60,15 +60,6 @@ def test_a_track_is_straight_between_its_points_and_its_first_is_the_start(
     assert parse_plan(plan.text).radio == plan.radio
 
 
-@given(st.tuples(NUMBERS, NUMBERS), st.tuples(st.floats(-99, 99), st.floats(-99, 99)))
-def test_a_velocity_is_a_line(place: tuple[float, float], velocity: tuple[float, float]) -> None:
-    changes = {f"{BASE}.position": [*place], f"{BASE}.velocity": [*velocity]}
-    station = parse_plan(edited(SMALL, changes)).radio.base_station
-    t = np.array([0.0, 2.5, 9.5])
-    np.testing.assert_allclose(station.at(t), place + t[:, None] * velocity, atol=1e-9)
-    assert station.moves is any(velocity)
-
-
 @given(st.text(st.sampled_from('0123456789.,-+einfatusm_\n #ortlhgd"'), max_size=200))
 def test_any_text_is_a_track_or_told_in_a_line(text: str) -> None:
     try:

@@ -165,18 +165,6 @@ def test_a_prediction_that_no_flight_has_confirmed_says_so(
     assert "not compared" in result.as_dict()["predicted"]["assumption"]
 
 
-def test_the_summary_and_the_findings_tell_one_flight(result: Result) -> None:
-    assert result.check is not None
-    link, prediction = result.check.link, result.prediction
-    assert link is not None
-    assert prediction is not None
-    again = check(result.check.mission, result.check.vehicle, solution=result.solution).prediction
-    assert again is not None
-    for name in ("rms_position_error", "max_position_error"):
-        assert getattr(link, name) == getattr(prediction, name) == getattr(again, name)
-    assert link.predicted_duration == prediction.duration
-
-
 def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) -> None:
     wanted = result.solution.plan.changed({"optimizer.rate": "mutual_information"})
     result = replace(result, information=MutualInformation(1.9, 1.8, 1.7, 0.001))

@@ -97,12 +97,12 @@ class _Measured:
         """
         import numpy as np
 
-        from faao_mav.plan.beside import MAX_CHARACTERS, read_rates
+        from faao_mav.plan.reader import MAX_BESIDE, read_rates
         from faao_mav.radio.rate_steps import RateSteps
 
         if (rates := self.rates) is None:
             raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
-        columns = read_rates(read_text(rates, MAX_CHARACTERS, "a table", InputError), str(rates))
+        columns = read_rates(read_text(rates, MAX_BESIDE, "a table", InputError), str(rates))
         if "mbit_per_s" not in columns:
             raise InputError(f"{rates}: no column mbit_per_s, which a throughput needs")
         steps = RateSteps.of(columns["snr_db"], columns["mbit_per_s"])

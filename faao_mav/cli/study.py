@@ -42,8 +42,14 @@ class _Asked:
         from faao_mav.plan.keys import POWER
         from faao_mav.plan.sections import Study
         from faao_mav.study import make_cases, parse_vary
-        from faao_mav.study.frontier import POINTS, frontier_cases, parse_frontier
-        from faao_mav.study.sweep import join_grid, parse_schemes, parse_values
+        from faao_mav.study.sweep import (
+            POINTS,
+            frontier_cases,
+            join_grid,
+            parse_frontier,
+            parse_schemes,
+            parse_values,
+        )
 
         options = [parse_vary(text) for text in self.vary or []]
         if self.power is not None:
@@ -96,7 +102,7 @@ def study(
     """
     from faao_mav.plan import read_plan
     from faao_mav.study import run_study
-    from faao_mav.study.frontier import frontier_table
+    from faao_mav.study.figure import frontier_table
     from faao_mav.study.rows import as_dict, comparison
 
     if jobs == 0:
@@ -131,8 +137,7 @@ def _draw(rows: "Sequence[StudyRow]", plan: "Plan", along: str | None, out: Path
     """Add the figure to what the study has written, where there is something to draw."""
     from faao_mav.plan.sections import Study
     from faao_mav.report.style import save_figure
-    from faao_mav.study.figure import can_draw, study_figure
-    from faao_mav.study.frontier import frontier_figure
+    from faao_mav.study.figure import can_draw, frontier_figure, study_figure
 
     written, kind = [out / "rows.jsonl", out / "table.csv"], (plan.study or Study()).figure
     if can_draw(rows, kind):

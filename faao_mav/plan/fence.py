@@ -27,8 +27,7 @@ def geofence(contents: PlanFile, source: str) -> Fence:
     options = contents.fence
     if options is None:
         return Fence()
-    origin = contents.site.origin
-    frame = LocalFrame(origin.latitude, origin.longitude)
+    frame = contents.site.origin.frame
     of_file = _read(options, source, frame)
     zones = [(zone, True) for zone in options.inclusion]
     zones += [(zone, False) for zone in options.exclusion]

@@ -125,7 +125,7 @@ class PlanContents(PlanFile):
     @property
     def zones(self) -> tuple[Area, ...]:
         """The zones of `geofence` in local metres."""
-        return _zones(self.geofence, LocalFrame(self.origin.latitude, self.origin.longitude))
+        return _zones(self.geofence, self.origin.frame)
 
     @property
     def any_inclusion(self) -> bool:

@@ -16,6 +16,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from faao_mav.geodesy import LocalFrame
 from faao_mav.plan.fields import (
     MAX_LOCAL_DISTANCE,
     Flag,
@@ -45,6 +46,11 @@ class Origin:
     latitude: Number = key("Latitude.", "degrees", "degrees, -90 to 90, south negative")
     longitude: Number = key("Longitude.", "degrees", "degrees, -180 to 180, west negative")
     elevation: Number = key("Height above mean sea level.", "[-500, 9000] m", default=0.0)
+
+    @property
+    def frame(self) -> LocalFrame:
+        """The local frame about it."""
+        return LocalFrame(self.latitude, self.longitude)
 
 
 def _keep(origin: Origin, info: ValidationInfo) -> Origin:

@@ -4,7 +4,6 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame
 from faao_mav.mission.item import Home, Mission, MissionItem
 from faao_mav.plan import Plan
@@ -83,9 +82,8 @@ def assemble(route: Route, plan: Plan) -> Mission:
 
 def _places(positions: Real, plan: Plan) -> list[tuple[float, float]]:
     """Return `positions` (k, 2), m, in degrees, to 0.1 mm."""
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    latitudes, longitudes = (np.round(each, 9).tolist() for each in frame.to_geodetic(positions))
-    return list(zip(latitudes, longitudes, strict=True))
+    degrees = np.round(plan.origin.frame.to_geodetic(positions), 9)
+    return [(latitude, longitude) for latitude, longitude in degrees.T.tolist()]
 
 
 def _finish(plan: Plan, place: tuple[float, float]) -> MissionItem:

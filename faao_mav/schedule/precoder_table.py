@@ -6,7 +6,6 @@ from typing import Literal
 import numpy as np
 
 from faao_mav.errors import InputError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 
@@ -45,9 +44,7 @@ def precoder_table(solution: Solution) -> str:
     Raises `InputError` as `check_of_slots` does.
     """
     check_of_slots(solution)
-    origin = solution.plan.origin
-    frame = LocalFrame(origin.latitude, origin.longitude)
-    latitude, longitude = frame.to_geodetic(solution.w)
+    latitude, longitude = solution.plan.origin.frame.to_geodetic(solution.w)
     names = ["slot", "t_s", "east_m", "north_m", "latitude_deg", "longitude_deg"]
     columns = [np.arange(len(solution.t)), solution.t, *solution.w.T, latitude, longitude]
     if solution.shares is not None:

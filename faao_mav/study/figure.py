@@ -1,4 +1,7 @@
-"""The figures of a study: rates along what is varied, and routes on a map."""
+"""What a study shows: rates along what is varied, routes on a map, and a frontier.
+
+A frontier is the most data for every duration, power or energy.
+"""
 
 import json
 import re
@@ -8,18 +11,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
+from faao_mav.plan.keys import POWER
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
 from faao_mav.study.rows import StudyRow, rates_by_place, spread
-from faao_mav.study.sweep import Value
+from faao_mav.study.sweep import ENERGY, Value
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _AXES = {
-    "power_dbm": "power W of both stations, dBm",
+    POWER: "power W of both stations, dBm",
     "flight.duration": "duration T, s",
     "flight.altitude": "height H, m",
     "radio.rician_factor": "Rician factor K",
@@ -29,8 +34,11 @@ _AXES = {
 _CAUSAL = "radio.causal"
 """The key whose values are lines of one plot: what causality costs, and what planning wins back."""
 
+_AMOUNTS = {"flight.duration": "duration, s", POWER: "power, dBm", ENERGY: "energy, Wh"}
+"""What a frontier's axis and the column of its table are called."""
+
 _SHORT = {
-    "power_dbm": ("W", " dBm"),
+    POWER: ("W", " dBm"),
     "flight.duration": ("T", " s"),
     "radio.modulation": ("", ""),
     "radio.duplex": ("", " duplex"),
@@ -204,3 +212,63 @@ def _named(values: Mapping[str, Value]) -> str:
         name, unit = _SHORT.get(key, (key.rsplit(".", 1)[-1], ""))
         parts.append(f"{name} = {text}{unit}" if name else text + unit)
     return ", ".join(parts)
+
+
+def pareto(rows: Sequence[StudyRow], key: str) -> tuple[StudyRow, ...]:
+    """Return the rows than which none delivers as much for less, by rising values of `key`."""
+    best: list[StudyRow] = []
+    delivering = [row for row in rows if row.delivered is not None]
+    for row in sorted(delivering, key=lambda row: (float(row.values[key]), -_data(row))):
+        if not best or _data(row) > _data(best[-1]):
+            best.append(row)
+    return tuple(best)
+
+
+def _data(row: StudyRow) -> float:
+    """Return what a row delivers, megabytes, or without a bandwidth bit/Hz per slot."""
+    if row.delivered_mbytes is not None:
+        return row.delivered_mbytes
+    return (row.delivered or 0.0) * len(row.route)
+
+
+def _amounts(rows: Sequence[StudyRow], plan: Plan) -> tuple[Real, str]:
+    """Return what `rows` deliver, and in which unit."""
+    amounts = np.array([_data(row) for row in rows])
+    if plan.radio.bandwidth_mhz is not None:
+        return amounts, "megabytes"
+    return amounts * plan.flight.time_step, "bit/Hz"
+
+
+def frontier_table(rows: Sequence[StudyRow], plan: Plan, key: str) -> str:
+    """Return the points of the frontier as lines of the terminal."""
+    best = pareto(rows, key)
+    amounts, unit = _amounts(best, plan)
+    lines = [f"{_AMOUNTS[key]:>12}  {f'delivered, {unit}':>20}  bit/s/Hz"]
+    lines += [
+        f"{row.values[key]:12g}  {amount:20.4g}  {row.delivered:8.4f}"
+        for row, amount in zip(best, amounts.tolist(), strict=True)
+    ]
+    failed = [row for row in rows if row.error]
+    if failed:
+        lines.append(f"{len(failed)} of {len(rows)} points failed, first: {failed[0].error}")
+    return "\n".join(lines)
+
+
+def frontier_figure(rows: Sequence[StudyRow], plan: Plan, key: str) -> "Figure":
+    """Return the figure of the frontier: the curve, and the route of each of its points."""
+    from matplotlib import colormaps
+
+    best = pareto(rows, key)
+    amounts, unit = _amounts(best, plan)
+    at = np.array([float(row.values[key]) for row in best])
+    colours = colormaps["viridis"](np.linspace(0, 0.9, len(best)))
+    with drawing(9.6, 4.4) as figure:
+        curve, routes = figure.subplots(1, 2)
+        curve.plot(at, amounts, color="0.6", linewidth=1.2)
+        curve.scatter(at, amounts, color=colours, zorder=3)
+        curve.set_ylim(bottom=0)
+        label(curve, plan.name or "trade-off", _AMOUNTS[key], f"delivered, {unit}")
+        for row, colour in zip(best, colours, strict=True):
+            routes.plot(*row.route.T, color=colour, linewidth=1.4)
+        as_map(routes, plan, "routes, in the colours of the curve")
+    return figure

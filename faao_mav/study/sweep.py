@@ -1,4 +1,4 @@
-"""What a study runs: the grid of values, schemes and seeds, as plans of their own."""
+"""The plans that a study runs: the grid of values, schemes and seeds, or a frontier."""
 
 import hashlib
 import itertools
@@ -10,11 +10,17 @@ from decimal import Decimal, InvalidOperation
 from importlib.metadata import version
 from typing import Any, TypeAlias, get_args
 
+import numpy as np
+
 from faao_mav.errors import InputError, PlanError, place_of, quote
-from faao_mav.plan.keys import ALIASES, unknown_key, varied_twice
+from faao_mav.plan import Plan
+from faao_mav.plan.checks import fewest_slots
+from faao_mav.plan.fields import dbm
+from faao_mav.plan.keys import ALIASES, POWER, unknown_key, varied_twice
 from faao_mav.plan.reader import changed
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
+from faao_mav.power import JOULES_PER_WH
 
 Value: TypeAlias = Any
 """The value of a varied key, as YAML reads it: a number, a word, a list."""
@@ -169,3 +175,79 @@ def make_cases(
             plan = dump_yaml(changed(data, chosen | changes | seeded))
             made.append(StudyCase(pairs, scheme, seed, plan, source))
     return tuple(made)
+
+
+POINTS = 12
+"""Points of a frontier, unless told otherwise. Chosen: a smooth curve by eye."""
+
+_DECIBELS = 20.0
+"""How far below the plan's powers a frontier begins, dB. Chosen: from there on little arrives."""
+
+ENERGY = "goal.energy_wh"
+
+_DECIMALS = 4
+"""Decimals of the energies of a frontier, Wh, which are rounded up. Chosen."""
+
+_FRONTIERS = {"duration": "flight.duration", "power": POWER, "energy": ENERGY}
+"""The key of the plan that each trade-off varies."""
+
+
+def parse_frontier(text: str) -> str:
+    """Return the key that `--frontier AXIS,data` varies. Raises `InputError`.
+
+    >>> parse_frontier("power,data")
+    'power_dbm'
+    """
+    axis, _, of = text.partition(",")
+    if axis.strip() not in _FRONTIERS or of.strip() != "data":
+        accepted = " or ".join(f"{name},data" for name in _FRONTIERS)
+        raise InputError(f"--frontier {quote(text)}: expected {accepted}")
+    return _FRONTIERS[axis.strip()]
+
+
+def frontier_cases(plan: Plan, key: str, points: int = POINTS) -> tuple[StudyCase, ...]:
+    """Return the cases of the most data at `points` values of `key`, the plan's own the last.
+
+    Durations are whole time steps from the shortest on. Powers rise by the same dB at both
+    stations, and the value is that of the base station, dBm. Energies, of flights of any duration
+    up to the plan's, rise from the straight flight's to that of the plan without a limit, which is
+    optimised for it. Raises `InputError` where the plan cannot be asked for energies.
+    """
+    data = load_yaml(plan.text, plan.source)
+    for section in ("goal", "study"):
+        data.pop(section, None)
+    cases = []
+    along = {"flight.duration": _durations, POWER: _powers, ENERGY: _energies}[key]
+    for changes in along(plan, points):
+        value = next(iter(changes.values()))
+        more = {"goal.maximise": "data"} if key == ENERGY else {}
+        text = dump_yaml(changed(data, changes | more))
+        scheme = plan.optimizer.precoder
+        cases.append(StudyCase(((key, value),), scheme, plan.radio.seed, text, plan.source))
+    return tuple(cases)
+
+
+def _durations(plan: Plan, points: int) -> list[dict[str, float]]:
+    slots = np.unique(np.rint(np.linspace(fewest_slots(plan), plan.flight.slots, points)))
+    return [{"flight.duration": round(n * plan.flight.time_step, 9)} for n in slots.tolist()]
+
+
+def _energies(plan: Plan, points: int) -> list[dict[str, float]]:
+    from faao_mav.optimizer.direct import direct
+    from faao_mav.optimizer.goal import thriftiest_straight
+    from faao_mav.optimizer.problem import build_problem
+
+    if plan.vehicle.power is None or not plan.radio.causal:
+        missing = "vehicle.power" if plan.vehicle.power is None else "radio.causal: true"
+        raise InputError(f"{plan.source}: --frontier energy,data: give {missing} in the plan")
+    most = direct(build_problem(plan)).energy_wh
+    least = thriftiest_straight(plan)[1] / JOULES_PER_WH
+    assert most is not None
+    values = np.linspace(min(least, most), most, points).round(_DECIMALS) + 10.0**-_DECIMALS
+    return [{ENERGY: value} for value in values.round(_DECIMALS).tolist()]
+
+
+def _powers(plan: Plan, points: int) -> list[dict[str, float]]:
+    given = dict(zip(ALIASES[POWER], map(dbm, plan.powers), strict=True))
+    down = np.linspace(-_DECIBELS, 0, points).round(3).tolist()
+    return [{key: round(own + less, 6) for key, own in given.items()} for less in down]

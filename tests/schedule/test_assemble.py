@@ -46,18 +46,6 @@ def test_too_many_items_are_counted() -> None:
         mission_of(t, w, plan_with(max_items=rows - 1))
 
 
-def test_a_speed_is_commanded_where_it_changes() -> None:
-    plan = plan_with()
-    route = initial_route(*dash_hover_dash(), plan)
-    places, still = np.array([[50.0 * k, 0.0] for k in range(6)]), np.zeros(6)
-    speeds = np.array([8.0, 5.5, 5.5, 3.0, 8.0])
-    route = replace(route, positions=places, speeds=speeds, waits=still, radii=still)
-    mission = assemble(route, plan)
-    commanded = [i.params[1] for i in mission.items if i.command == Command.DO_CHANGE_SPEED]
-    assert commanded == [8.0, 5.5, 3.0, 8.0]
-    assert items_of(mission, plan)[1] == list(speeds)
-
-
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_waits_are_what_the_autopilot_keeps_and_radii_are_passed_on(autopilot: str) -> None:
     plan = plan_with(autopilot=autopilot)

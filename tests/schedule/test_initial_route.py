@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from relay_flights import STEADY, Trajectory, dash, dash_hover_dash, items_of, plan_with
+from relay_flights import Trajectory, dash, dash_hover_dash, items_of, plan_with
 
 from faao_mav.arrays import Real
 from faao_mav.plan import Plan
@@ -53,7 +53,6 @@ def trajectories(draw: st.DrawFn) -> Trajectory:
     return t, w
 
 
-@STEADY
 @given(
     trajectories(),
     st.sampled_from(["ardupilot", "px4"]),
@@ -72,7 +71,6 @@ def test_any_flight_keeps_to_its_path(
         assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1.0 + 5e-3 * len(route.speeds))
 
 
-@STEADY
 @given(
     st.lists(
         st.tuples(st.floats(-300, 300), st.floats(-300, 300), st.floats(0, 20)),

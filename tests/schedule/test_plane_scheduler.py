@@ -8,7 +8,6 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot.body import density_ratio
 from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InputError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.plan import Plan
 from faao_mav.schedule import Conversion
@@ -20,9 +19,9 @@ RATIO = density_ratio(684.0) ** -0.5
 
 
 def plane_plan(**changes: float) -> Plan:
-    plan = plan_with(max_speed=16.0, path_tolerance=5.0)
-    vehicle = {"type": "plane", "min_speed": 12.0, "parameters": changes}
-    return plan.changed({f"vehicle.{key}": value for key, value in vehicle.items()})
+    return plan_with(
+        type="plane", min_speed=12.0, max_speed=16.0, parameters=changes, path_tolerance=5.0
+    )
 
 
 def along(path: Real) -> Trajectory:
@@ -93,8 +92,7 @@ def test_the_whole_mission_flies_like_its_schedule(
     of total energy control: 2.3 m, or 0.16 s, at the end.
     """
     conversion, plan = flight[0], plane_plan()
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    track = predict(conversion.mission, conversion.vehicle, frame)
+    track = predict(conversion.mission, conversion.vehicle, plan.origin.frame)
     schedule, t = conversion.schedule, conversion.schedule.t
     waypoints = [
         k for k, item in enumerate(conversion.mission.items) if item.command == Command.NAV_WAYPOINT

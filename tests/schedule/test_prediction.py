@@ -10,7 +10,6 @@ from conftest import MakePlan
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.rate import cutoff_rate
@@ -88,7 +87,7 @@ def test_the_table_holds_every_slot(small_plan: MakePlan) -> None:
     solution = optimize(small_plan())
     rows = list(csv.DictReader(io.StringIO(precoder_table(solution))))
     assert len(rows) == len(solution.t)
-    frame = LocalFrame(solution.plan.origin.latitude, solution.plan.origin.longitude)
+    frame = solution.plan.origin.frame
     for n, row in enumerate(rows):
         assert row.pop("taken_by") == "place"
         values = {name: float(value) for name, value in row.items()}

@@ -17,7 +17,6 @@ from relay_flights import (
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.predict import predict
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command
 from faao_mav.schedule import Conversion
 
@@ -131,8 +130,7 @@ def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) 
     assert waits[1:] == pytest.approx(route.waits[1:])
     assert (route.waits == np.round(route.waits, 3)).all()
     assert 0 < route.speeds.min() <= route.speeds.max() <= 1.1 * plan.vehicle.max_speed
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-    whole = predict(conversion.mission, conversion.vehicle, frame)
+    whole = predict(conversion.mission, conversion.vehicle, plan.origin.frame)
     items = conversion.mission.items
     waypoints = [  # or the delay at each, which ends later
         index + (items[index + 1].command == Command.NAV_DELAY)

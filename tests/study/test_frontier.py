@@ -13,8 +13,9 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.plan import parse_plan
 from faao_mav.plan.keys import POWER
-from faao_mav.study.frontier import frontier_cases, frontier_table, pareto, parse_frontier
+from faao_mav.study.figure import frontier_table, pareto
 from faao_mav.study.rows import StudyRow
+from faao_mav.study.sweep import frontier_cases, parse_frontier
 
 points = st.tuples(st.integers(0, 9), st.none() | st.integers(0, 9))
 
