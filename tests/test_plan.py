@@ -185,28 +185,19 @@ def test_a_relay_is_causal_unless_the_plan_says_otherwise() -> None:
 
 
 def test_too_short_a_duration_says_how_long_it_takes() -> None:
-    message = refused({"flight.end": [300, 50]})
-    assert "300 m, which takes at least 19.5 s at 20 m/s and 5 m/s^2" in message
-    plan = parse_plan(edited(SMALL, {"flight.end": [300, 50], "flight.duration": 19.5}))
-    assert plan.flight.duration == 19.5
-
-
-@pytest.mark.parametrize(
-    ("velocity", "bounded", "needed"),
-    [("free", True, 15.5), ("hover", False, 18.0), ([20, 0], True, 17.5)],
-)
-def test_shortest_duration_depends_on_the_ends(
-    velocity: object, bounded: bool, needed: float
-) -> None:
     # 300 m at 20 m/s take 15 s and a step at w_F; each ramp of 4 s costs 2 s more, a jump none
-    changes = {
-        "flight.end": [300, 50],
-        "flight.start_velocity": velocity,
-        "flight.end_velocity": "free" if velocity == "free" else "hover",
-        "flight.bound_first_acceleration": bounded,
-        "flight.duration": 5,
-    }
-    assert f"at least {needed:g} s" in refused(changes)
+    far = {"flight.end": [300, 50], "flight.duration": 5}
+    for start, end, bounded, needed in (
+        ("hover", "hover", True, 19.5),
+        ("free", "free", True, 15.5),
+        ("hover", "hover", False, 18.0),
+        ([20, 0], "hover", True, 17.5),
+    ):
+        ends = {"flight.start_velocity": start, "flight.end_velocity": end}
+        changes = far | ends | {"flight.bound_first_acceleration": bounded}
+        takes = f"300 m, which takes at least {needed:g} s at 20 m/s and 5 m/s^2"
+        assert takes in refused(changes)
+        assert parse_plan(edited(SMALL, changes | {"flight.duration": needed})).flight.slots > 30
 
 
 @pytest.mark.parametrize(
@@ -244,18 +235,10 @@ def test_text_that_is_no_plan(text: str, part: str) -> None:
     assert part in str(caught.value)
 
 
-def test_unreadable_files(tmp_path: Path) -> None:
-    with pytest.raises(PlanError, match=r"absent\.yaml: cannot be read: No such file"):
-        read_plan(tmp_path / "absent.yaml")
-    with pytest.raises(PlanError, match="cannot be read"):
-        read_plan(tmp_path)
-    (tmp_path / "latin.yaml").write_bytes(b"name: \xff\n")
-    with pytest.raises(PlanError, match=r"latin\.yaml: line 1: byte 0xff is not UTF-8"):
-        read_plan(tmp_path / "latin.yaml")
-
-
-def test_byte_order_mark_and_crlf_are_read(tmp_path: Path) -> None:
+def test_a_file_is_read_with_mark_and_crlf_or_told(tmp_path: Path) -> None:
     path = tmp_path / "plan.yaml"
+    with pytest.raises(PlanError, match=r"plan\.yaml: cannot be read: No such file"):
+        read_plan(path)
     path.write_bytes(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode())
     assert read_plan(path).flight.slots == 20
 

@@ -15,7 +15,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.fly.setpoints import Course, Setpoint, at_rest
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.schedule.transit import way_between, way_home, way_out
+from faao_mav.schedule.assemble import way_between, way_home, way_out
 
 NEAR, LEVEL = 2.0, 1.0
 """Metres across and up within which an aircraft is on course; chosen: a stream that nothing

@@ -28,6 +28,10 @@ FEWEST_SLOTS = 3
 _SLACK = 1e-6
 """Metres that the reach may be short: a plan at the very limit is not refused for rounding."""
 
+_NO_POWER = (
+    "what the flight takes is missing; give vehicle.power, as {hover_w: 170, cruise_w: 130, at: 10}"
+)
+
 
 def problems(plan: PlanContents) -> Iterator[str]:
     """Yield what is wrong with `plan`, key first; each may rest on those before it being right."""
@@ -90,7 +94,8 @@ def _speeds(plan: PlanContents) -> Iterator[str]:
             told = f"flight.{end}_velocity: {given} is {airspeed:.6g} m/s through the air; vehicle."
         if airspeed > plan.max_airspeed:
             default = "" if vehicle.max_airspeed else ", by default,"
-            yield f"{told}max_airspeed{default} allows {plan.max_airspeed:.4g} m/s{_in_wind(plan)}"
+            limit = f"{plan.max_airspeed:.4g} m/s in a wind of {_wind(plan)}"
+            yield f"{told}max_airspeed{default} allows {limit}"
         if airspeed < least:
             yield f"{told}min_speed asks for at least {least:g} m/s: give free or a velocity"
 
@@ -99,10 +104,6 @@ def _wind(plan: PlanContents) -> str:
     wind = plan.site.wind
     gusts = f", gusts of {wind.gust:g} m/s" if wind.gust > wind.speed else ""
     return f"{wind.speed:g} m/s from {wind.from_degrees:g} degrees{gusts}"
-
-
-def _in_wind(plan: PlanContents) -> str:
-    return "" if plan.max_airspeed == math.inf else f" in a wind of {_wind(plan)}"
 
 
 def _relay(plan: PlanContents) -> Iterator[str]:
@@ -178,7 +179,6 @@ def _gain(plan: PlanContents) -> Iterator[str]:
 
 
 def _whole_map(flight: Flight, given: GainLaw, known: GainMap, key: str) -> Iterator[str]:
-    """Yield what is wrong with a map that is the gain itself."""
     for name, default in {"reference_gain_db": None, "exponent": 2.0, "elevation_db": ()}.items():
         if (value := getattr(given, name)) != default:
             yield (
@@ -211,7 +211,6 @@ def _steps(flight: Flight) -> Iterator[str]:
 
 
 def _stations(plan: PlanContents) -> Iterator[str]:
-    """Yield why a station cannot move as it is asked to."""
     lasts = plan.flight.duration
     for name, station in zip(("base_station", "ground_user"), plan.radio.stations, strict=True):
         given, key = quote(list(station.velocity)), f"radio.{name}."
@@ -240,11 +239,14 @@ def _distance(plan: PlanContents) -> Iterator[str]:
         return
     needed = fewest_slots(plan) * flight.time_step
     takes = f"at least {needed:.10g} s" if needed else "longer than can be planned"
+    most, limited = plan.max_airspeed, ""
+    if most < math.inf:
+        through = f"at most {most:.4g} m/s through the air (vehicle.max_airspeed)"
+        limited = f" in a wind of {_wind(plan)} and {through}"
     yield (
         f"flight.duration: {flight.duration:g} s is too short: from start to end is "
         f"{distance:.6g} m, which takes {takes} at {vehicle.max_speed:g} m/s and "
-        f"{vehicle.max_acceleration:g} m/s^2 with the given end velocities"
-        f"{_in_wind(plan)}{_airspeed(plan)}"
+        f"{vehicle.max_acceleration:g} m/s^2 with the given end velocities{limited}"
     )
 
 
@@ -273,20 +275,14 @@ def _goal(plan: PlanContents) -> Iterator[str]:
             "does not plan for; give radio.causal: true"
         )
     if goal.counts_energy and plan.vehicle.power is None:
-        yield (
-            f"goal.{goal.searches}: what the flight takes is missing; give vehicle.power, as "
-            "{hover_w: 170, cruise_w: 130, at: 10}"
-        )
+        yield f"goal.{goal.searches}: {_NO_POWER}"
 
 
 def _power(plan: PlanContents) -> Iterator[str]:
     power, copter = plan.vehicle.power, plan.vehicle.type == "copter"
     if power is None:
         if plan.vehicle.battery is not None:
-            yield (
-                "vehicle.battery: what the flight takes is missing; give vehicle.power, as "
-                "{hover_w: 170, cruise_w: 130, at: 10}"
-            )
+            yield f"vehicle.battery: {_NO_POWER}"
         return
     measured = ("hover_w", "cruise_w", "at") if copter else ("cruise_w", "at")
     missing = [name for name in measured if getattr(power, name) is None]
@@ -301,12 +297,6 @@ def _power(plan: PlanContents) -> Iterator[str]:
             f"vehicle.power.cruise_w: {power.cruise_w:g} W at {power.at:g} m/s: rotors that take "
             f"{power.hover_w:g} W in hover take at least {least:.4g} W there"
         )
-
-
-def _airspeed(plan: PlanContents) -> str:
-    most = plan.max_airspeed
-    told = f" and at most {most:.4g} m/s through the air (vehicle.max_airspeed)"
-    return "" if most == math.inf else told
 
 
 def _study(plan: PlanContents) -> Iterator[str]:

@@ -122,7 +122,6 @@ def fence_problems(plan: PlanContents) -> Iterator[str]:
 
 
 def _way_problems(plan: PlanContents, kept: FreeArea) -> Iterator[str]:
-    """Yield why the way from start to end cannot be flown."""
     flight, margin = plan.flight, plan.margin
     ends = np.array([flight.start, flight.end])
     # among the many corners of ground the shortest way takes long

@@ -67,11 +67,13 @@ def _below(section: type, prefix: str) -> Iterator[PlanKey]:
         info = FieldInfo.from_annotated_attribute(of, field)
         written = next((m for m in info.metadata if isinstance(m, Written)), Written(""))
         in_file = written.accepted if isinstance(written.accepted, str) else written.accepted()
+        path = prefix + (info.alias or field.name)
         inner = list(_sections(info.annotation))
-        inside = tuple(key.path for one in inner for key in _below(one, "") if "." not in key.path)
+        below = [key for one in inner for key in _below(one, f"{path}.")]
+        names = (key.path.removeprefix(f"{path}.") for key in below)
+        inside = tuple(name for name in names if "." not in name)
         extra: Any = info.json_schema_extra or {"unit": "", "accepted": ""}
         required = info.is_required()
-        path = prefix + (info.alias or field.name)
         yield PlanKey(
             path,
             info.description or inner[0].__doc__.partition("\n")[0],
@@ -84,12 +86,10 @@ def _below(section: type, prefix: str) -> Iterator[PlanKey]:
             inside,
             _choices(info.annotation),
         )
-        for one in inner:
-            yield from _below(one, f"{path}.")
+        yield from below
 
 
 def _sections(annotation: Any) -> Iterator[Any]:
-    """Yield the sections that a field of this type holds."""
     if hasattr(annotation, "__pydantic_config__"):
         yield annotation
     for part in get_args(annotation):

@@ -1,7 +1,7 @@
 """`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
 import difflib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, fields
 from functools import cache, lru_cache
 from itertools import islice
@@ -135,7 +135,7 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
             section["method"] = method
         text = dump_yaml(data)
     # a copy of the text, as beside a result, has to stand without the files that it names
-    if files := dict(filled_in(data, source)):
+    if files := filled_in(data, source):
         text = dump_yaml(data)
     try:
         contents = _adapter().validate_python(data, context={})
@@ -160,40 +160,42 @@ def read_rates(text: str, path: str) -> dict[str, list[float]]:
         raise PlanError(f"{path}: {error}") from None
 
 
-_FILES = (
-    (("radio", "gain"), load_yaml),
-    (("radio", "base_station", "gain"), load_yaml),
-    (("radio", "ground_user", "gain"), load_yaml),
+_GAINS = (("radio", "gain"), ("radio", "base_station", "gain"), ("radio", "ground_user", "gain"))
+
+_FILES: tuple[tuple[tuple[str, ...], Callable[[str, str], Any] | None], ...] = (
+    *((keys, load_yaml) for keys in _GAINS),
+    *(((*keys, "map"), None) for keys in _GAINS),
     (("radio", "base_station", "track"), read_track),
     (("radio", "ground_user", "track"), read_track),
     (("radio", "rates"), read_rates),
 )
 """Keys whose value may be the name of a file with what stands there otherwise, and how it is read:
-from its text, and its name for messages."""
+from its text, and its name for messages. Maps are no text."""
 
 
-def filled_in(data: dict[str, Any], source: str) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Put what is in the files that the plan `data` names into their places; yield keys and files.
+def filled_in(data: dict[str, Any], source: str) -> dict[tuple[str, ...], str]:
+    """Put what is in the files that the plan `data` names into their places; return them by key.
 
     Names are relative to the plan's file `source`, that of a map to the file that names it. Raises
     `PlanError` for a file that cannot be read.
     """
+    files: dict[tuple[str, ...], str] = {}
     for keys, read in _FILES:
-        place, folder = f"{source}: {'.'.join(keys)}", Path(source).parent
+        section, key, law = _holder(data, keys), keys[-1], files.get(keys[:-1])
+        name = section.get(key)
+        if not isinstance(name, str) or "\n" in name or name.startswith(WORD):
+            continue  # it is the content itself
+        path = Path(law or source).parent / name
         try:
-            section, key = _holder(data, keys), keys[-1]
-            if path := _file(section.get(key), folder):
-                section[key] = read(read_text(path, MAX_BESIDE, "text", PlanError), str(path))
-                yield keys, str(path)
-                place, folder = f"{place}: {path}: map", path.parent
+            if read is None:
+                section[key] = _word(path, _version(path))
             else:
-                place = f"{place}.map"
-            law = _holder(data, (*keys, "map"))
-            if path := _file(law.get("map"), folder):
-                law["map"] = _word(path, _version(path))
-                yield (*keys, "map"), str(path)
+                section[key] = read(read_text(path, MAX_BESIDE, "text", PlanError), str(path))
         except InputError as error:
-            raise PlanError(f"{place}: {error}") from None
+            place = f"{'.'.join(keys[:-1])}: {law}: {key}" if law else ".".join(keys)
+            raise PlanError(f"{source}: {place}: {error}") from None
+        files[keys] = str(path)
+    return files
 
 
 def _version(path: Path) -> tuple[int, int] | None:
@@ -212,17 +214,10 @@ def _word(path: Path, version: tuple[int, int] | None) -> str:
 
 
 def _holder(data: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return the mapping in `data` that has the last of `keys`; an empty one for none."""
     for step in keys[:-1]:
         inside = data.get(step)
         data = inside if isinstance(inside, dict) else {}
     return data
-
-
-def _file(name: object, folder: Path) -> Path | None:
-    if not isinstance(name, str) or "\n" in name or name.startswith(WORD):
-        return None
-    return folder / name
 
 
 def _plain(value: Any, source: str) -> Any:
@@ -312,7 +307,6 @@ def _accepted(known: Mapping[str, PlanKey], *keys: str) -> str:
 
 
 def _nearest(known: Mapping[str, PlanKey], *keys: str) -> str:
-    """Return where an unknown key may belong."""
     *above, name = keys
     section = known.get(".".join(above))
     here = sorted(section.inside if section else (path for path in known if "." not in path))

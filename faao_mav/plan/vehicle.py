@@ -54,14 +54,9 @@ class PowerOptions:
             if self.cruise_w is not None and self.at is not None:
                 return FixedWing.fitted(self.cruise_w, self.at, mass)
             return FixedWing(self.c1, self.c2, mass)
-        model = RotaryWing.of(
-            mass=self.mass or _COPTER_MASS,
-            rotor_area=self.rotor_area,
-            solidity=self.solidity,
-            tip_speed=self.tip_speed,
-            drag_ratio=self.drag_ratio,
-            air_density=self.air_density,
-        )
+        names = ("rotor_area", "solidity", "tip_speed", "drag_ratio", "air_density")
+        shape = {name: getattr(self, name) for name in names}
+        model = RotaryWing.of(mass=self.mass or _COPTER_MASS, **shape)
         if self.hover_w is None or self.cruise_w is None or self.at is None:
             return model
         return model.fitted(self.hover_w, self.cruise_w, self.at)

@@ -16,9 +16,9 @@ from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.report import style
+from faao_mav.schedule.assemble import way_home, way_out
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
-from faao_mav.schedule.transit import way_home, way_out
 from faao_mav.vector import lengths
 
 if TYPE_CHECKING:

@@ -13,11 +13,10 @@ from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
-from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.assemble import ROUNDING, assemble, check_transit
+from faao_mav.schedule.prediction import Schedule
 from faao_mav.schedule.route import initial_route, slowest_leg, with_run_in
-from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import ALLOWED_ERROR, CopterScheduler, PlaneScheduler, Scheduler
-from faao_mav.schedule.transit import ROUNDING, check_transit
 from faao_mav.schedule.waypoints import DIGITS, SLOWEST
 
 _FINEST_TOLERANCE = 0.5  # the path tolerance, m, that is not halved again for a fence; chosen
@@ -98,7 +97,6 @@ def beyond_vehicle(plan: Plan) -> list[str]:
 
 
 def _with(given: Vehicle, parameters: Mapping[str, float]) -> Vehicle:
-    """Return the vehicle `given` with `parameters` over its own."""
     return replace(given, parameters={**given.parameters, **parameters})
 
 
@@ -198,10 +196,8 @@ def _scheduler(plan: Plan, t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
 
 
 def _altitude(plan: Plan) -> float:
-    """Return the height of the flight above mean sea level, m."""
     return plan.origin.elevation + plan.flight.altitude
 
 
 def _true_over_commanded(plan: Plan) -> float:
-    """Return true over commanded airspeed at the height of the flight."""
     return plan.aircraft.flight_model().true_over_commanded(_altitude(plan))

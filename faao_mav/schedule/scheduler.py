@@ -25,8 +25,8 @@ from faao_mav.autopilot import FlightPath, Model, Vehicle
 from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.errors import InputError
 from faao_mav.plan import Vector
+from faao_mav.schedule.prediction import PASSING_WINDOW, Schedule, positions_at
 from faao_mav.schedule.route import Route, sent_speeds
-from faao_mav.schedule.schedule import PASSING_WINDOW, Schedule, positions_at
 from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Retimed, Unknowns, stepped
 from faao_mav.schedule.waypoints import SHORTEST_HOVER
 from faao_mav.vector import lengths

@@ -15,14 +15,14 @@ flight tells.
 Constants that name no source are chosen; what a change costs is not measured.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
 from faao_mav.autopilot.model import LegDurations
+from faao_mav.schedule.prediction import LATE_WEIGHT, Schedule
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import LATE_WEIGHT, Schedule
 from faao_mav.schedule.waypoints import SLOWEST
 from faao_mav.vector import lengths
 
@@ -42,20 +42,6 @@ _REACHED = 1.03  # the largest ratio of a command and the speed flown for which 
 _MOVE = 0.2
 _NUDGE = 1e-5  # the same where nothing is known but that commands are not reached; downwards only
 _NEAR = 4  # the speed of a leg tells on how long these take: it, one before, two behind
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Retiming:
-    """A retimed flight at the instants (n,) that were asked for.
-
-    `positions` (n, 2), m, and `velocities` (n, 2), m/s; `samples` (n,), the nearest samples of the
-    flight that was retimed. `late` is by how much later than planned the flight is over, s.
-    """
-
-    positions: Real
-    velocities: Real
-    samples: Integers
-    late: float
 
 
 class Retimed:
@@ -101,8 +87,12 @@ class Retimed:
         self._done = done / np.maximum(done[-1], 1e-9)
         self._told = self._durations(route.speeds)
 
-    def at(self, t: Real, route: Route) -> Retiming:
-        """Return the flight with the commands of `route` at the plan's times `t` (n,), s."""
+    def at(self, t: Real, route: Route) -> tuple[Real, Real, Integers, float]:
+        """Return the flight with the commands of `route` at the plan's times `t` (n,), s.
+
+        Positions (n, 2), m, velocities (n, 2), m/s, the nearest samples (n,) of the flight that is
+        retimed, and by how much later than planned it is over, s.
+        """
         delays = self._done @ self._longer(route.speeds) + self._left @ (route.waits - self._waits)
         ahead = route.lead - self._lead
         clock = np.maximum.accumulate(self._t + delays) - (
@@ -114,13 +104,10 @@ class Retimed:
         share = (t - begins) / widths
         steps = self._steps[k - 1]
         kept = np.minimum(np.maximum(share, 0.0), 1.0)
-        return Retiming(
-            positions=self._places[k - 1] + kept[:, None] * steps,
-            # before and after, the aircraft is at an end
-            velocities=steps / widths[:, None] * (share == kept)[:, None],
-            samples=k - (share < 0.5),
-            late=self._late + float(delays[self._over] - delays[self._met]) - ahead,
-        )
+        # before and after, the aircraft is at an end
+        velocities = steps / widths[:, None] * (share == kept)[:, None]
+        late = self._late + float(delays[self._over] - delays[self._met]) - ahead
+        return self._places[k - 1] + kept[:, None] * steps, velocities, k - (share < 0.5), late
 
     def slopes(self, route: Route, samples: Integers) -> Real:
         """Return what the commands of `route` do to when the flight is where, (n + 1, 2 m).
@@ -153,11 +140,10 @@ class Retimed:
         return later
 
     def _longer(self, speeds: Real) -> Real:
-        """Return T_k, s, at other `speeds` (..., m - 1), m/s; same shape."""
         return self._durations(speeds) - self._told
 
     def _durations(self, speeds: Real) -> Real:
-        """Return how long the legs take, s, but for what stays as it is."""
+        """Return how long the legs take, s, but for what stays as it is; shape as `speeds`."""
         if self._known is not None:
             return self._known.flown(speeds)[1]
         durations: Real = self._cruise * self._speeds / np.minimum(speeds, self._peaks)
@@ -224,14 +210,14 @@ class Goal:
         residuals = self.residuals(schedule.positions(self.t), schedule.late)
         return float(residuals @ residuals)
 
-    def slopes(self, found: Retiming, later: Real) -> Real:
-        """Return what the unknowns do to the residuals, (r, k).
+    def slopes(self, velocities: Real, later: Real) -> Real:
+        """Return what the unknowns do to the residuals of a flight at `velocities` (n, 2), (r, k).
 
         `later` (n + 1, k), s, is by how much later they make the flight, in the end by its last
         row.
         """
-        velocities = found.velocities * self._weight
-        apart = -(velocities.T[:, :, None] * later[:-1]).reshape(-1, later.shape[1])
+        moved = velocities.T * self._weight
+        apart = -(moved[:, :, None] * later[:-1]).reshape(-1, later.shape[1])
         slopes: Real = np.vstack([apart, LATE_WEIGHT * later[-1:]])
         return slopes
 
@@ -240,17 +226,16 @@ def stepped(goal: Goal, unknowns: Unknowns, retimed: Retimed, begin: Real) -> tu
     """Return the best `x` (k,) of the `retimed` flight from `begin` on, and its cost, m²."""
     low, high = unknowns.low, unknowns.high
 
-    def flown(x: Real) -> tuple[Route, Retiming, Real, float]:
-        route = unknowns.commanded(x)
-        found = retimed.at(goal.t, route)
-        residuals = goal.residuals(found.positions, found.late)
-        return route, found, residuals, float(residuals @ residuals)
+    def flown(x: Real) -> tuple[Real, Integers, Real, float]:
+        positions, velocities, samples, late = retimed.at(goal.t, unknowns.commanded(x))
+        residuals = goal.residuals(positions, late)
+        return velocities, samples, residuals, float(residuals @ residuals)
 
     x, damping = unknowns.reached(begin, retimed.limits), 1e-3
-    route, found, residuals, cost = flown(x)
+    velocities, samples, residuals, cost = flown(x)
     for _ in range(_STEPS):
-        later = retimed.slopes(route, found.samples) @ unknowns.chain
-        slopes = goal.slopes(found, later)
+        later = retimed.slopes(unknowns.commanded(x), samples) @ unknowns.chain
+        slopes = goal.slopes(velocities, later)
         gradient = residuals @ slopes
         stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
         slopes[:, stuck] = 0.0
@@ -262,7 +247,7 @@ def stepped(goal: Goal, unknowns: Unknowns, retimed: Retimed, begin: Real) -> tu
             tried = np.minimum(np.maximum(x + np.linalg.solve(damped, downhill), low), high)
             new = flown(tried)
             if new[-1] < cost:
-                x, (route, found, residuals, cost), damping = tried, new, damping / 5
+                x, (velocities, samples, residuals, cost), damping = tried, new, damping / 5
                 break
             damping *= 10
         if cost > (1 - _SETTLED) * before:

@@ -4,8 +4,10 @@ Constants that name no source are chosen; what a change costs is not measured.
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -89,7 +91,6 @@ def _boxed(t: Real, w: Real, slow: Flags, radius: float) -> list[Waypoint]:
 
 
 def _is_apart(t: Real, new: Waypoint, hovers: list[Waypoint]) -> bool:
-    """Tell whether there are 3 s between the hover `new` and each of `hovers`."""
     begin, end = t[new.first] - SHORTEST_HOVER, t[new.last] + SHORTEST_HOVER
     return all(t[known.last] < begin or t[known.first] > end for known in hovers)
 
@@ -162,7 +163,6 @@ def _speeds(t: Real, w: Real, window: float) -> Real:
 
 
 def _runs(mask: Flags) -> Iterator[tuple[int, int]]:
-    """Yield first and last index of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     for begin, end in edges.reshape(-1, 2):
         yield int(begin), int(end) - 1
@@ -222,25 +222,18 @@ def _longest_legs(w: Real, tolerance: float) -> list[int]:
     ends: list[int] = []
     first, last = 0, len(w) - 1
     while True:
+        strays = partial(_strays, w, tolerance, first)
         step = 1
-        while first + step < last and _fits(w, first, min(first + 2 * step, last), tolerance):
+        while first + step < last and not strays(min(first + 2 * step, last)):
             step = min(2 * step, last - first)
         if first + step >= last:
             return ends
-        low, high = step, min(2 * step, last - first)
-        while high - low > 1:
-            middle = (low + high) // 2
-            if _fits(w, first, first + middle, tolerance):
-                low = middle
-            else:
-                high = middle
-        first += low
+        farther = range(first + step + 1, min(first + 2 * step, last))
+        first += step + bisect_left(farther, True, key=strays)
         ends.append(first)
 
 
-def _fits(w: Real, first: int, last: int, tolerance: float) -> bool:
-    """Tell whether the samples between two stay close to the leg from one to the other."""
+def _strays(w: Real, tolerance: float, first: int, last: int) -> bool:
     passed = w[first + 1 : last]
-    return bool(
-        len(passed) == 0 or distances_to_segment(passed, w[first], w[last]).max() <= tolerance
-    )
+    apart = distances_to_segment(passed, w[first], w[last])
+    return bool(apart.max(initial=0.0) > tolerance)

@@ -126,7 +126,6 @@ def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
 
 
 def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> None:
-    """Draw mean and spread over seeds."""
     at = list(rows[0].values).index(axis)
     for name, inside, shown, k in _series(rows, measure):
         points = sorted(

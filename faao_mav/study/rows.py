@@ -29,7 +29,6 @@ MAX_BYTES = 100_000_000
 
 
 def _route(pairs: object) -> Real:
-    """Return `pairs` of metres as an array (n, 2)."""
     try:
         route = np.array(pairs or np.empty((0, 2)), dtype=np.float64)
     except (TypeError, ValueError):

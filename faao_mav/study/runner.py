@@ -111,7 +111,6 @@ def _rows(
 
 @contextmanager
 def _connected(address: str) -> Iterator[None]:
-    """Let joblib send its work to the Dask scheduler at `address`."""
     from joblib import parallel_config
 
     check_extra("cluster", "distributed", f"cluster {address}: a study there")

@@ -16,9 +16,8 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.model import in_ground
-from faao_mav.schedule.prediction import Prediction, rates_along
+from faao_mav.schedule.prediction import Prediction, passing, rates_along
 from faao_mav.schedule.route import begins_at_speed
-from faao_mav.schedule.schedule import passing
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LATE_START, LinkCheck, Stretch
 from faao_mav.validate.flown import Line, departure

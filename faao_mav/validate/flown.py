@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike
 from faao_mav.arrays import Real
 from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
-from faao_mav.schedule.prediction import Prediction, price_flight
+from faao_mav.schedule.prediction import Prediction, positions_at, price_flight
 from faao_mav.schedule.route import set_out
-from faao_mav.schedule.schedule import positions_at
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.vector import distances_to_path, lengths
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from faao_mav.schedule.schedule import deviation, lateness
+from faao_mav.schedule.prediction import deviation, lateness
 from faao_mav.vector import distances_to_path, distances_to_segment
 
 COORDINATES = st.floats(-1e4, 1e4)

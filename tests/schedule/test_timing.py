@@ -10,8 +10,8 @@ from faao_mav.arrays import Real
 from faao_mav.autopilot import FlightPath, Flown, Vehicle
 from faao_mav.autopilot.ardupilot.copter import ArduCopter
 from faao_mav.errors import InputError
+from faao_mav.schedule.prediction import Schedule
 from faao_mav.schedule.route import Route
-from faao_mav.schedule.schedule import Schedule
 from faao_mav.schedule.scheduler import CopterScheduler
 from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD
 

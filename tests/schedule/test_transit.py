@@ -14,10 +14,9 @@ from faao_mav.errors import InfeasibleError, InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Command, Mission
 from faao_mav.plan import Plan, parse_plan
-from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.assemble import assemble, check_transit, way_home, way_out
 from faao_mav.schedule.conversion import check_vehicle
 from faao_mav.schedule.route import initial_route, with_run_in
-from faao_mav.schedule.transit import check_transit, way_home, way_out
 
 WALL = {"polygon": [[-60, 15], [60, 15], [60, 30], [-60, 30]]}
 ROUND = {"center": [150, 25], "radius": 20}

@@ -14,8 +14,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
-from faao_mav.schedule.prediction import price_flight
-from faao_mav.schedule.schedule import positions_at
+from faao_mav.schedule.prediction import positions_at, price_flight
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.comparison import compare_with_plan, predicted_line
 from faao_mav.validate.flown import FlightRecord, Line, debriefing, plan_start, standing
