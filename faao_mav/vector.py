@@ -10,9 +10,6 @@ from faao_mav.arrays import Real
 Vector: TypeAlias = tuple[float, float]
 """East and north components, metres or m/s."""
 
-_CELLS = 1 << 14
-"""Pairs of point and leg that are compared at once: their arrays stay in a processor's cache."""
-
 
 def lengths(vectors: Real) -> Real:
     """Return the Euclidean length of each of `vectors` (..., 2), shape (...).
@@ -65,18 +62,8 @@ def distances_to_path(points: Real, path: Real) -> Real:
     >>> distances_to_path(np.array([[1.0, 2.0], [7.0, 4.0]]), np.array([[0.0, 0.0], [4.0, 0.0]]))
     array([2., 5.])
     """
-    if len(path) == 1:
-        return lengths(points - path[0])
-    begin, chord = path[:-1].T, np.diff(path, axis=0).T
-    square = chord[0] ** 2 + chord[1] ** 2
-    square[square == 0] = 1.0
-    result = np.empty(len(points))
-    rows = max(1, _CELLS // len(square))
-    for first in range(0, len(points), rows):
-        some = points[first : first + rows, :, None]
-        east, north = some[:, 0] - begin[0], some[:, 1] - begin[1]
-        share = np.clip((east * chord[0] + north * chord[1]) / square, 0, 1)
-        east -= share * chord[0]
-        north -= share * chord[1]
-        result[first : first + rows] = np.sqrt((east**2 + north**2).min(axis=1))
-    return result
+    import shapely  # seldom needed, and slow to load
+
+    line = shapely.linestrings(np.vstack([path, path[-1:]]))  # of two places at least
+    with np.errstate(divide="ignore", invalid="ignore"):  # the length of a leg may underflow
+        return np.asarray(shapely.distance(shapely.points(points), line))
