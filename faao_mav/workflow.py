@@ -143,8 +143,10 @@ class Result:
                 header=comment_for(mission),
             ).encode(errors="replace")  # the name of a mission may be no Unicode
         write_together(contents)
-        for outdated in _may_lie_beside(mission) - {*beside}:
-            remove_outdated(outdated)
+        known = [fence_path(mission), *(parameter_path(mission, each) for each in autopilots())]
+        for outdated in known:
+            if outdated and outdated not in beside and mission.suffix.lower() != ".kml":
+                remove_outdated(outdated)
         return mission, *beside
 
     def as_dict(self) -> dict[str, Any]:
@@ -386,12 +388,3 @@ def mission_files(path: str | Path, plan: Plan) -> tuple[Path, ...]:
         beside.append(fence)
         check_replaceable(fence, "the mission's fence is")
     return mission, *beside
-
-
-def _may_lie_beside(mission: Path) -> set[Path]:
-    """Return the files that are taken for those of `mission`; none for a drawing."""
-    if mission.suffix.lower() == ".kml":
-        return set()
-    fence = fence_path(mission)
-    parameters = {parameter_path(mission, each) for each in autopilots()}
-    return parameters if fence is None else {fence, *parameters}

@@ -256,9 +256,7 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     errors = deviation(solution.t, solution.w, t, w, solution.plan.mission.path_tolerance)
     I_U, I_G = rates_along(solution, at)
     nearest, shares = nearest_slots(solution, at), solution.shares
-    other = np.flatnonzero(nearest != np.arange(len(at)))
-    near_U, near_G = I_U.copy(), I_G.copy()
-    near_U[other], near_G[other] = rates_along(solution, at, nearest, only=other)
+    near_U, near_G = rates_along(solution, at, nearest)
     near_shares = shares[nearest] if shares is not None else None
     return Prediction(
         w=at,
@@ -274,20 +272,16 @@ def price_flight(solution: Solution, t: Real, w: Real) -> Prediction:
     )
 
 
-def rates_along(
-    solution: Solution, w: Real, slots: Integers | None = None, *, only: Integers | None = None
-) -> tuple[Real, Real]:
+def rates_along(solution: Solution, w: Real, slots: Integers | None = None) -> tuple[Real, Real]:
     """Return I_U (7) and I_G (8), bits, each (n,), where the aircraft is at `w` (n, 2) in slot n.
 
     Each slot keeps its fading; the line of sight and the path gain are those at `w`. The
     precoders are those of the same slot, or of `slots` (n,), as `nearest_slots` gives for a radio
     that goes by position. Precoders that know the draw of an averaged fading stay with the draw.
-    With `only` (k,) they are the rates (k,) of those slots of the n alone.
     """
-    at = np.arange(len(w)) if only is None else only
-    of = at if slots is None else slots[at]
+    of = slice(None) if slots is None else slots
     I_U, I_G = (
-        link.mean_rates(link.channel(w)[..., at, :, :], P[..., of, :, :])
+        link.mean_rates(link.channel(w), P[..., of, :, :])
         for link, P in zip(solution.problem.links, (solution.P_B, solution.P_U), strict=True)
     )
     return I_U, I_G

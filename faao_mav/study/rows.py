@@ -182,14 +182,10 @@ def in_order(cases: Sequence[StudyCase], rows: Mapping[str, StudyRow]) -> tuple[
     )
 
 
-MEASURES = ("R_avg", "delivered")
-"""The fields of a row that are compared."""
-
-
 def rates_by_place(
     rows: Sequence[StudyRow], measure: str
 ) -> dict[tuple[tuple[str, ...], str], list[float]]:
-    """Return `measure`, one of `MEASURES`, of all seeds by values and scheme, in order, bit/s/Hz.
+    """Return the field `measure` of all seeds by values and scheme, in order, bit/s/Hz.
 
     The values are JSON: those of a position, a list or a mapping, can then be looked up.
     """
@@ -212,7 +208,7 @@ def comparison(rows: Sequence[StudyRow]) -> str:
 
     Values are down, schemes across, each cell has mean and spread.
     """
-    text = [line for measure in MEASURES for line in _compared(rows, measure)]
+    text = [line for measure in ("R_avg", "delivered") for line in _compared(rows, measure)]
     failed = [row for row in rows if row.error]
     if failed:
         text.append(f"{len(failed)} of {len(rows)} rows failed, first: {failed[0].error}")
