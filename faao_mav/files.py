@@ -178,13 +178,9 @@ def unpacked(file: BinaryIO, names: Sequence[str]) -> dict[str, "np.ndarray[Any,
 
 def check_writable(path: str | Path) -> None:
     """Raise `InputError` when `path` plainly cannot be written: better now than after the work."""
-    target = Path(os.path.realpath(path))
-    try:
+    target, kind = Path(os.path.realpath(path)), stat.S_IFREG
+    with _writing(path), contextlib.suppress(FileNotFoundError):
         kind = target.stat().st_mode
-    except FileNotFoundError:
-        kind = stat.S_IFREG
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
     if stat.S_ISDIR(kind):
         raise InputError(f"{path}: is a directory; give the name of a file")
     if not stat.S_ISREG(kind):  # a file would take the place of the device

@@ -70,17 +70,6 @@ def converted(t: Real, w: Real, plan: Plan) -> Conversion:
     return convert(SimpleNamespace(plan=plan, t=t, w=w))  # type: ignore[arg-type]
 
 
-def nearly_there(conversion: Conversion, w: Real, near: float = 2.0) -> float:
-    """Return how much later than planned the flight comes within `near` m of w_F for good, s."""
-    schedule, flown = conversion.schedule, conversion.schedule.flown
-
-    def settled(t: Real, positions: Real) -> float:
-        outside = np.flatnonzero(np.hypot(*(positions - w[-1]).T) > near)
-        return float(t[outside[-1] + 1]) if len(outside) else float(t[0])
-
-    return settled(flown.t - schedule.start, flown.position[:, :2]) - settled(schedule.t, w)
-
-
 def mission_of(t: Real, w: Real, plan: Plan) -> Mission:
     """Return the mission that flies a bare trajectory."""
     return assemble(initial_route(t, w, plan), plan)

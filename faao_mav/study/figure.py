@@ -23,27 +23,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_AXES = {
-    POWER: "power W of both stations, dBm",
-    "flight.duration": "duration T, s",
-    "flight.altitude": "height H, m",
-    "radio.rician_factor": "Rician factor K",
+_KEYS = {
+    POWER: ("power W of both stations, dBm", "W", " dBm"),
+    "flight.duration": ("duration T, s", "T", " s"),
+    "flight.altitude": ("height H, m", "H", " m"),
+    "radio.rician_factor": ("Rician factor K", "K", ""),
+    "radio.modulation": ("", "", ""),
+    "radio.duplex": ("", "", " duplex"),
 }
-"""The label of the axis along which a key is varied; other keys are their own labels."""
+"""The label of the axis along which a key is varied, its symbol and its unit in legends; other keys
+are their own labels, and an empty symbol leaves the value alone."""
 
 _CAUSAL = "radio.causal"
 """The key whose values are lines of one plot: what causality costs, and what planning wins back."""
 
 _AMOUNTS = {"flight.duration": "duration, s", POWER: "power, dBm", ENERGY: "energy, Wh"}
 """What a frontier's axis and the column of its table are called."""
-
-_SHORT = {
-    POWER: ("W", " dBm"),
-    "flight.duration": ("T", " s"),
-    "radio.modulation": ("", ""),
-    "radio.duplex": ("", " duplex"),
-}
-"""The symbol and the unit of a varied key in legends; an empty symbol leaves the value alone."""
 
 _SCHEMES = {
     "faao": "FAAO",
@@ -116,7 +111,7 @@ def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
         for plot, (name, inside) in zip(plots, panels.items(), strict=False):
             _lines(plot, inside, axis, measure)
             title = name or plan.name or "rate by scheme"
-            label(plot, title, _AXES.get(axis, axis), f"{unit}, bit/s/Hz")
+            label(plot, title, _KEYS.get(axis, (axis,))[0], f"{unit}, bit/s/Hz")
             plot.tick_params(labelbottom=True)  # the plot beneath may be none
         for plot in plots[len(panels) :]:
             plot.remove()
@@ -208,7 +203,7 @@ def _named(values: Mapping[str, Value]) -> str:
         text = value if isinstance(value, str) else json.dumps(value)
         if key == "radio.modulation":  # as in 16-QAM
             text = re.sub(r"^\d+", r"\g<0>-", text.upper())
-        name, unit = _SHORT.get(key, (key.rsplit(".", 1)[-1], ""))
+        name, unit = _KEYS.get(key, ("", key.rsplit(".", 1)[-1], ""))[1:]
         parts.append(f"{name} = {text}{unit}" if name else text + unit)
     return ", ".join(parts)
 
