@@ -21,14 +21,13 @@ import numpy as np
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import ENERGY_SHARE
-from faao_mav.optimizer.interior.maximize import constraints_of, maximize
+from faao_mav.optimizer.interior.maximize import constraints_of, maximize, nearest_flight
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.starts import shortest_by, sparing_starts
 from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.optimizer.search.track import nearest_flight
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import read_plan
 from faao_mav.plan.fields import dbm

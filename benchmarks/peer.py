@@ -17,11 +17,12 @@ import casadi as ca
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
+from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.kinematics import LENGTH as METRES
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.rates.table_rate import TableRate
 from faao_mav.optimizer.search.starts import points_along, starts

@@ -36,8 +36,9 @@ import scipy.sparse as sp
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError, SolverError
+from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
-from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
@@ -85,53 +86,46 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
     precoders = [np.tile(P, (len(flight.w), 1, 1)) for P in equal]
     if options.precoder in SCHEMES:
         precoders = _precoders_at(problem, flight, precoders)
-    iterates = [(_rate(problem, flight, precoders), flight, precoders)]
+
+    def reached() -> float:  # R_avg of (9), bit/s/Hz
+        return float(problem.rates(flight.w, precoders).mean(axis=1).min())
+
+    history, best = [reached()], (flight, precoders)
     converged, ending = False, f"max_iterations ({options.max_iterations}) reached"
-    for iteration in range(1, options.max_iterations + 1):
-        last, best = iterates[-1][0], max(rate for rate, _, _ in iterates)
 
-        def tell(stage: str, iteration: int = iteration, best: float = best) -> None:
-            if observe is not None:
-                observe(Progress(iteration, options.max_iterations, stage, best))
+    def tell(stage: str) -> None:
+        if observe is not None:
+            most, number = options.max_iterations, len(history)
+            observe(Progress(number, most, stage, max(history)))
 
+    for _ in range(options.max_iterations):
         try:
             tell("trajectory (27)")
-            sums = [
-                link_sum(link, link.small_scale(flight.w), P)
-                for link, P in zip(links, precoders, strict=True)
-            ]
+            hops = zip(links, precoders, strict=True)
+            sums = [link_sum(link, link.small_scale(flight.w), P) for link, P in hops]
             flight = optimize_trajectory(problem, sums, flight)
             tell("precoders (35)")
             precoders = _precoders_at(problem, flight, precoders)
         except SolverError as error:
-            ending = f"stopped in iteration {iteration}, the best so far is kept: {error}"
+            ending = f"stopped in iteration {len(history)}, the best so far is kept: {error}"
             break
-        iterates.append((_rate(problem, flight, precoders), flight, precoders))
-        if abs(iterates[-1][0] - last) < options.tolerance:
+        history.append(reached())
+        if history[-1] == max(history):
+            best = flight, precoders
+        if abs(history[-1] - history[-2]) < options.tolerance:
             converged, ending = True, f"R_avg changed by less than {options.tolerance:g} bit/s/Hz"
             break
-    _, flight, precoders = max(reversed(iterates), key=lambda iterate: iterate[0])
-    history = [rate for rate, _, _ in iterates]
-    return make_solution(problem, flight, precoders, history, converged=converged, ending=ending)
-
-
-def _rate(problem: Problem, flight: Trajectory, precoders: Sequence[Complex]) -> float:
-    """Return R_avg of (9), bit/s/Hz."""
-    return min(
-        float(link.mean_rates(link.channel(flight.w), P).mean())
-        for link, P in zip(problem.links, precoders, strict=True)
-    )
+    return make_solution(problem, *best, history, converged=converged, ending=ending)
 
 
 def _precoders_at(problem: Problem, flight: Trajectory, last: Sequence[Complex]) -> list[Complex]:
     """Return the precoders of both links at `flight`: the plan's scheme, or (35) from `last`."""
-    scheme, found = SCHEMES.get(problem.plan.optimizer.precoder), []
-    for link, P in zip(problem.links, last, strict=True):
-        H = link.channel(flight.w)
-        found.append(
-            scheme(H, link.power, link.noise) if scheme else optimize_precoders(link, H, P)
-        )
-    return found
+    scheme = SCHEMES.get(problem.plan.optimizer.precoder)
+    channels = [(link, link.channel(flight.w)) for link in problem.links]
+    if scheme is not None:
+        return [scheme(H, link.power, link.noise) for link, H in channels]
+    hops = zip(channels, last, strict=True)
+    return [optimize_precoders(link, H, P) for (link, H), P in hops]
 
 
 def _check_plan(problem: Problem) -> None:

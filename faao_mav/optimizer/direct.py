@@ -12,30 +12,29 @@ starts, and several times quicker.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.design import Design, design
+from faao_mav.optimizer.design import Design, Link, design
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
     feasible,
     maximize,
+    nearest_flight,
     objective,
 )
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.problem import Link, Problem, counted_as_cutoff
+from faao_mav.optimizer.problem import Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.search.multistart import EQUAL, improve_starts, paced
 from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
-from faao_mav.optimizer.search.starts import sparing_starts, starts
-from faao_mav.optimizer.search.track import nearest_flight
+from faao_mav.optimizer.search.starts import EQUAL, improve_starts, paced, sparing_starts, starts
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.rate_steps import RateSteps
@@ -50,9 +49,6 @@ that is flown at, half of the last keeps the aircraft on it, 3 % of the distance
 
 _FOLLOWED = 2
 """Starts over a map that are improved: the best as they are. Chosen."""
-
-_TOLLED_ITERATIONS = 40
-"""Iterations of a flight under shadowing, at most. Chosen."""
 
 
 def direct(
@@ -69,7 +65,6 @@ def direct(
     The result is never worse than any start. Raises `InfeasibleError` when there is no flight at
     all.
     """
-    kin, relay = problem.kinematics, problem.maximised_queue
     scheme, own_steps = design(problem.plan, problem.precoder), problem.uav_user.steps
     counts_cutoff = problem.plan.optimizer.rate == "cutoff" or scheme.gaussian
     before = None if counts_cutoff else direct(counted_as_cutoff(problem))
@@ -79,42 +74,33 @@ def direct(
             observe(Progress(number, 2, stage, best))
 
     tell(0, "rates over the map", 0.0)
-    field = rate_field(problem, scheme)
-
-    def value(flight: Trajectory) -> float:
-        """What is reported: rates of the alphabet, or the steps, not what smooths them."""
-        if scheme.gaussian or own_steps is not None:
-            return _worth(problem, flight.w, _designed(problem, scheme, flight.w))
-        return objective(field.value(flight.w.T), kin, relay)
-
-    routes = _routes(problem, before, known, field, alone=alone)
+    search = _Search(problem, scheme, rate_field(problem, scheme))
+    routes = search.routes(before, known, alone=alone)
     tell(1, "the starts", 0.0)
-    steps = problem.plan.optimizer.max_iterations * _LONG_SEARCH
-    begun = {name: value(flight) for name, flight in routes.items()}
+    begun = {name: search.value(flight) for name, flight in routes.items()}
     improved, reached, going = routes, begun, list(routes)
     if problem.mapped:
         going = sorted(begun, key=begun.__getitem__, reverse=True)[:_FOLLOWED]
     elif len(routes) > 1:  # a single start needs no comparison
-        improved, going = improve_starts(problem, field, routes, steps)
-        reached = {name: value(flight) for name, flight in improved.items()}
+        improved, going = improve_starts(problem, search.field, routes, search.most_steps)
+        reached = {name: search.value(flight) for name, flight in improved.items()}
     first, then = (max(each, key=each.__getitem__) for each in (begun, reached))
     starts, best_yet = [improved[name] for name in going], improved[then]
     if begun[first] > reached[then]:  # no start was improved as far
         best_yet = routes[first]
         starts.append(best_yet)
     tell(2, "the best start", max(begun[first], reached[then]))
-    warm = len(routes) > 1
-    optima = [_followed(problem, field, start, steps, warm=warm) for start in starts]
-    ends = {name: value(end.trajectory) for name, end in zip(going, optima, strict=False)}
-    best = _best(problem, field, optima)
+    optima = [search.followed(start, warm=len(routes) > 1) for start in starts]
+    ends = {name: search.value(end.trajectory) for name, end in zip(going, optima, strict=False)}
+    best = search.best(optima)
     if isinstance(own_steps, RateSteps):
-        best = _sharpened(problem, scheme, [*optima, replace(best, trajectory=best_yet)], steps)
+        best = search.sharpened([*optima, replace(best, trajectory=best_yet)])
     if spread_known(problem):
-        best = _under_shadowing(problem, field, best)
+        best = search.under_shadowing(best)
     flight = best.trajectory
     precoders = [
         _precoders(link, rate, scheme, flight.w)
-        for link, rate in zip(field.links, field.rates, strict=True)
+        for link, rate in zip(search.field.links, search.field.rates, strict=True)
     ]
     ending = f"stationary to {best.residual:.1e}"
     if not best.converged:
@@ -125,149 +111,140 @@ def direct(
     found = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
     # values by tables may be above those of the precoders, and without shadowing more is delivered
     history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
-    gain = None
-    if before is not None:
-        gain = found - _worth(problem, before.w, [before.P_B, before.P_U])
     return replace(
         solution,
         history=np.append(np.minimum(history, found), found),
         starts={name: min(each, found) for name, each in (reached | ends).items()},
-        gain=gain,
+        gain=None if before is None else found - search.worth(before.w, [before.P_B, before.P_U]),
     )
 
 
-def _routes(
-    problem: Problem,
-    before: Solution | None,
-    known: Trajectory | None,
-    field: RateField,
-    *,
-    alone: bool,
-) -> dict[str, Trajectory]:
-    """Return the flights from which the search starts, by name.
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """The search for the best flight of `problem`, by the rates over `field` of a `scheme`."""
 
-    They are those of `optimizer.starts`, over maps those of `map`; `cutoff`, that of the plan
-    for the cutoff rate `before`; and `known`, that of a similar plan, or this `alone`.
-    """
-    kin, fenced = problem.kinematics, problem.fenced(problem.kinematics)
-    stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
-    names = ("straight",) if alone or problem.mapped else problem.plan.optimizer.starts
-    routes = starts_over_map(problem, field) if problem.mapped and not alone else {}
-    if not routes:
-        routes = starts(kin, names, stations, problem.free_area, fenced)
-    if before is not None:
-        routes["cutoff"] = before.trajectory
-    if known is not None:
-        calm = (*constraints_of(kin), *fenced)
-        near = feasible(kin, next(iter(routes.values())), _in_time(problem, known), calm)
-        routes = {"known": near} if alone else routes | {"known": near}
-    if problem.energy < np.inf:
-        kept = problem.constraints(kin)
-        routes = sparing_starts(kin, routes, (*constraints_of(kin), *kept))
+    problem: Problem
+    scheme: Design
+    field: RateField
+
+    @property
+    def most_steps(self) -> int:
+        """Steps of one search at most."""
+        return self.problem.plan.optimizer.max_iterations * _LONG_SEARCH
+
+    def worth(self, w: Real, precoders: Sequence[Complex] | None = None) -> float:
+        """Return what is maximised, bit/s/Hz, at w (n, 2) with `precoders` or the scheme's."""
+        problem = self.problem
+        if precoders is None:
+            precoders = [self.scheme.precoders(link, link.channel(w)) for link in problem.links]
+        rates = problem.rates(w, precoders)
+        return objective(rates, problem.kinematics, problem.maximised_queue)
+
+    def value(self, flight: Trajectory) -> float:
+        """Return what is reported: by the alphabet or the steps, not what smooths them."""
+        if self.scheme.gaussian or self.problem.uav_user.steps is not None:
+            return self.worth(flight.w)
+        rates = self.field.value(flight.w.T)
+        return objective(rates, self.problem.kinematics, self.problem.maximised_queue)
+
+    def routes(
+        self, before: Solution | None, known: Trajectory | None, *, alone: bool
+    ) -> dict[str, Trajectory]:
+        """Return the flights from which the search starts, by name.
+
+        They are those of `optimizer.starts`, over maps those of `map`; `cutoff`, that of the plan
+        for the cutoff rate `before`; and `known`, that of a similar plan, or this `alone`.
+        """
+        problem, kin = self.problem, self.problem.kinematics
+        fenced, routes = problem.fenced(kin), dict[str, Trajectory]()
+        stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
+        names = ("straight",) if alone or problem.mapped else problem.plan.optimizer.starts
+        if problem.mapped and not alone:
+            routes = starts_over_map(problem, self.field)
         if not routes:
-            raise InfeasibleError("no flight was found that takes so little energy")
-    return routes
+            routes = starts(kin, names, stations, problem.free_area, fenced)
+        if before is not None:
+            routes["cutoff"] = before.trajectory
+        if known is not None:
+            near = feasible(kin, next(iter(routes.values())), self._in_time(known), fenced)
+            routes = {"known": near} if alone else routes | {"known": near}
+        if problem.energy < np.inf:
+            kept = (*constraints_of(kin), *problem.constraints(kin))
+            routes = sparing_starts(kin, routes, kept)
+            if not routes:
+                raise InfeasibleError("no flight was found that takes so little energy")
+        return routes
 
+    def _in_time(self, flight: Trajectory) -> Real:
+        """Return velocities (n, 2) at which the path of `flight` takes the time of the problem.
 
-def _in_time(problem: Problem, flight: Trajectory) -> Real:
-    """Return velocities (n, 2) at which the path of `flight` takes the time of `problem`.
+        With a least speed they are those of the nearest flight that has it, if one is found.
+        """
+        kin = self.problem.kinematics
+        slower = paced(kin, flight, kin.time_step)
+        if kin.min_speed == 0:
+            return slower
+        then, now = (np.linspace(0, 1, n) for n in (kin.slots, len(flight.w)))
+        path = np.stack([np.interp(then, now, w) for w in flight.w.T], axis=1)
+        near = nearest_flight(kin, path, kin.follow(slower), self.problem.constraints(kin))
+        return slower if near is None else near.v
 
-    With a least speed they are those of the nearest flight that has it, if one is found.
-    """
-    kin = problem.kinematics
-    slower = paced(kin, flight, kin.time_step)
-    if kin.min_speed == 0:
-        return slower
-    then, now = (np.linspace(0, 1, n) for n in (kin.slots, len(flight.w)))
-    path = np.stack([np.interp(then, now, w) for w in flight.w.T], axis=1)
-    near = nearest_flight(kin, path, kin.follow(slower), problem.constraints(kin))
-    return slower if near is None else near.v
+    def followed(self, start: Trajectory, *, warm: bool = True) -> LocalOptimum:
+        """Return what is found from `start`: over maps close by, by the maps as they are."""
+        if self.problem.mapped:
+            return improved_over_map(self.problem, self.field, start)
+        return self.maximized(self.field, start, self.most_steps, warm=warm)
 
+    def maximized(
+        self, stage: Stage, start: Trajectory, most_steps: int, *, warm: bool = True
+    ) -> LocalOptimum:
+        """Return what is found from `start`, which is nearly optimal where `warm`."""
+        kin, options = self.problem.kinematics, self.problem.plan.optimizer
+        return maximize(
+            kin,
+            stage,
+            start,
+            constraints=self.problem.constraints(kin),
+            tolerance=options.tolerance,
+            max_iterations=most_steps,
+            warm=warm,
+            relay=self.problem.maximised_queue,
+        )
 
-def _best(problem: Problem, field: RateField, optima: list[LocalOptimum]) -> LocalOptimum:
-    """Return the best of `optima`; of equal ones that which delivers most, then the first.
+    def best(self, optima: list[LocalOptimum]) -> LocalOptimum:
+        """Return the best of `optima`; of equal ones that which delivers most, then the first.
 
-    A route and its mirror image have the same R_avg, and may deliver very different amounts.
-    """
-    most = max(optimum.value for optimum in optima)
-    equal = [optimum for optimum in optima if optimum.value > most - EQUAL]
+        A route and its mirror image have the same R_avg, and may deliver very different amounts.
+        """
+        most = max(optimum.value for optimum in optima)
 
-    def delivered(optimum: LocalOptimum) -> float:
-        rates = field.value(optimum.trajectory.w.T)
-        return round(objective(rates, problem.kinematics, problem.relay) / EQUAL)
+        def delivered(optimum: LocalOptimum) -> float:
+            rates = self.field.value(optimum.trajectory.w.T)
+            return round(objective(rates, self.problem.kinematics, self.problem.relay) / EQUAL)
 
-    return max(equal, key=delivered)
+        return max((each for each in optima if each.value > most - EQUAL), key=delivered)
 
+    def sharpened(self, optima: list[LocalOptimum]) -> LocalOptimum:
+        """Return the best by the steps themselves of `optima` and of those for sharper steps."""
+        found, now = [*optima], optima
+        for width in _WIDTHS:
+            sharper = replace(self, field=rate_field(self.problem, self.scheme, width))
+            now = [sharper.followed(each.trajectory) for each in now]
+            found += now
+        return max(found, key=lambda each: self.worth(each.trajectory.w))
 
-def _followed(
-    problem: Problem,
-    field: RateField,
-    start: Trajectory,
-    steps: int,
-    *,
-    warm: bool = True,
-) -> LocalOptimum:
-    """Return what is found from `start`: over maps close by, by the maps as they are."""
-    if problem.mapped:
-        return improved_over_map(problem, field, start)
-    return _maximized(problem, field, start, steps, warm=warm)
+    def under_shadowing(self, optimum: LocalOptimum) -> LocalOptimum:
+        """Return the best under shadowing of `optimum` and of those less about one place."""
+        begin, problem, field = optimum.trajectory, self.problem, self.field
+        rates, steps = partial(field.value, begin.w.T), problem.plan.optimizer.max_iterations
+        stages = [tolled(problem, field.smoothed(), begin.w, rates, z) for z in TOLLS]
+        found = [optimum, *(self.maximized(each, begin, steps) for each in stages)]
 
+        def value(each: LocalOptimum) -> float:
+            w = each.trajectory.w
+            return worth(problem, w, partial(field.value, w.T))
 
-def _maximized(
-    problem: Problem,
-    stage: Stage,
-    start: Trajectory,
-    max_iterations: int,
-    *,
-    warm: bool = True,
-) -> LocalOptimum:
-    """Return what is found from `start`, which is nearly optimal where `warm`."""
-    return maximize(
-        problem.kinematics,
-        stage,
-        start,
-        constraints=problem.constraints(problem.kinematics),
-        tolerance=problem.plan.optimizer.tolerance,
-        max_iterations=max_iterations,
-        warm=warm,
-        relay=problem.maximised_queue,
-    )
-
-
-def _sharpened(
-    problem: Problem, scheme: Design, optima: Sequence[LocalOptimum], max_iterations: int
-) -> LocalOptimum:
-    """Return the best by the steps themselves of `optima` and of those for ever sharper steps."""
-    found, now = [*optima], [*optima]
-    for width in _WIDTHS:
-        field = rate_field(problem, scheme, width)
-        now = [_followed(problem, field, each.trajectory, max_iterations) for each in now]
-        found += now
-    flights = [each.trajectory.w for each in found]
-    worth = [_worth(problem, w, _designed(problem, scheme, w)) for w in flights]
-    return found[int(np.argmax(worth))]
-
-
-def _under_shadowing(problem: Problem, field: RateField, optimum: LocalOptimum) -> LocalOptimum:
-    """Return the best under shadowing of `optimum` and of those that stay less about one place."""
-    begin = optimum.trajectory
-    rates = partial(field.value, begin.w.T)
-    stages = [tolled(problem, field.smoothed(), begin.w, rates, z) for z in TOLLS]
-    found = [optimum, *(_maximized(problem, each, begin, _TOLLED_ITERATIONS) for each in stages)]
-    flights = [each.trajectory.w for each in found]
-    return found[int(np.argmax([worth(problem, w, partial(field.value, w.T)) for w in flights]))]
-
-
-def _worth(problem: Problem, w: Real, precoders: Sequence[Complex]) -> float:
-    """Return what `problem` maximises, bit/s/Hz, at positions w (n, 2) with both `precoders`."""
-    links = zip(problem.links, precoders, strict=True)
-    rates = [link.mean_rates(link.channel(w), P) for link, P in links]
-    return objective(np.stack(rates), problem.kinematics, problem.maximised_queue)
-
-
-def _designed(problem: Problem, scheme: Design, w: Real) -> list[Complex]:
-    """Return the precoders of both links at w (n, 2) by `scheme`."""
-    return [scheme.precoders(link, link.channel(w)) for link in problem.links]
+        return max(found, key=value)
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:

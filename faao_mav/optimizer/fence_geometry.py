@@ -60,7 +60,7 @@ class ConvexObstacles:
         return len(self.corners)
 
     @cached_property
-    def _sides(self) -> tuple[Real, Real]:
+    def sides(self) -> tuple[Real, Real]:
         """The outward normals (P, V, 2) of the sides and h there, infinite without a side."""
         along = np.roll(self.corners, -1, axis=1) - self.corners
         out = _unit(np.stack([along[..., 1], -along[..., 0]], axis=-1), axis=-1)
@@ -72,7 +72,7 @@ class ConvexObstacles:
 
         The straights go from a to b, (2, n) each.
         """
-        normals, offsets = self._sides
+        normals, offsets = self.sides
         values = np.minimum(normals @ a, normals @ b) - offsets
         piece, side = np.arange(len(self))[:, None], values.argmax(axis=1)
         best, h = values.max(axis=1), offsets[piece, side, 0]
@@ -197,10 +197,8 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
     if len(inclusions) > 1 and inside is not None and plan.any_inclusion:
         inclusions = [inside.buffer(-_SIMPLER).simplify(_SIMPLER)]
     pieces = list[tuple[Real, float]]()  # corners and radius
-    sides = [(np.empty((0, 2)), np.empty(0))]
-    for shape in inclusions:
-        hull = shapely.orient_polygons(shape.convex_hull)
-        sides.append(_sides(shapely.get_coordinates(hull)))
+    hulls = [shape.convex_hull for shape in inclusions]
+    for hull, shape in zip(hulls, inclusions, strict=True):
         pieces += [(piece, 0.0) for piece in convex_pieces(hull - shape)]
     for zone in zones:
         if zone.inclusion or (inside is not None and not zone.shape.intersects(inside)):
@@ -211,7 +209,12 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
             pieces.append((np.array([zone.disc[:2]]), zone.disc[2] * OUTSIDE))
     if plan.map_edge is not None:
         (west, south), (east, north) = plan.map_edge
-        sides.append(_sides(shapely.get_coordinates(shapely.box(west, south, east, north))))
+        hulls.append(shapely.box(west, south, east, north))
+    sides = [(np.empty((0, 2)), np.empty((0, 1)))]
+    for hull in hulls:
+        corners = shapely.get_coordinates(shapely.orient_polygons(hull))[:-1]
+        normals, offsets = ConvexObstacles.of([(corners, 0.0)]).sides
+        sides.append((normals[0], offsets[0]))
     ends = shapely.points([plan.flight.start, plan.flight.end])
     most = plan.max_ground_speed * plan.flight.duration + 2 * plan.margin
     near = [
@@ -220,12 +223,4 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
         if shapely.distance(shapely.MultiPoint(piece).convex_hull, ends).sum() - 2 * radius <= most
     ]
     normals, offsets = (np.concatenate(each) for each in zip(*sides, strict=True))
-    return FenceGeometry(ConvexObstacles.of(near), normals, offsets, plan.margin)
-
-
-def _sides(corners: Real) -> tuple[Real, Real]:
-    """Return outward normals (k, 2) and offsets (k,) of a closed outline that is convex."""
-    along = np.diff(corners, axis=0)
-    normals = np.stack([along[:, 1], -along[:, 0]], axis=1)
-    normals /= np.hypot(*normals.T)[:, None]
-    return normals, np.einsum("kc,kc->k", normals, corners[:-1])
+    return FenceGeometry(ConvexObstacles.of(near), normals, offsets[:, 0], plan.margin)

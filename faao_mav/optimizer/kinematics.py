@@ -6,7 +6,6 @@ the last one is flown too. a(N+1) moves nothing and is zero.
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -47,9 +46,8 @@ class Kinematics:
     paper, every sample of the airspeed v - `wind` is at least `min_speed`, for fixed wings do not
     hover, and at most `max_airspeed`, m/s. From each to the next its size falls by at most
     `most_fall`, m/s^2, and half its square rises by at most `most_power`, m^2/s^3: what drag takes
-    and thrust gives. Neither is infinite alone, nor without a least speed. An acceleration is at
-    most `most_turn`, rad/s, times the speed that counts in a turn (`turning`): guidance follows no
-    faster turns.
+    and thrust gives, both finite or none. An acceleration is at most `most_turn`, rad/s, times the
+    speed that counts in a turn (`turning`): guidance follows no faster turns.
 
     >>> kin = Kinematics(np.zeros(2), np.array([40.0, 0.0]), 9, 1.0, 6.0, 3.0, None, None, True)
     >>> flight = kin.follow(np.full((9, 2), [4.0, 0.0]))  # 4 m/s do not get there in 8 s: 5 m/s do
@@ -161,15 +159,15 @@ class Kinematics:
         wind, lasting = np.array(self.wind), self.time_step * (self.slots - 1)
         ahead = min(0.75, math.hypot(*wind) / self.min_speed) if self.min_speed > 0 else 0.75
 
-        def through_air(velocity: Real | None) -> Real | None:
-            return None if velocity is None else velocity - wind
-
+        start, end = (
+            None if v is None else v - wind for v in (self.start_velocity, self.end_velocity)
+        )
         return replace(
             self,
             end=self.end - lasting * wind,
             max_speed=min(self.max_airspeed, self.max_speed + math.hypot(*self.wind)),
-            start_velocity=through_air(self.start_velocity),
-            end_velocity=through_air(self.end_velocity),
+            start_velocity=start,
+            end_velocity=end,
             max_airspeed=math.inf,
             wind=(0.0, 0.0),
             # the share of an airspeed that counts in turns against the wind, or at least a half
@@ -219,12 +217,13 @@ class Kinematics:
         given end velocity, so that a solver's tolerance does not add up along the flight.
         """
         dt, steps = self.time_step, self.slots - 1
-        a = acceleration[:-1].copy()
-        missing = [self.end - self.start - steps * dt * start_velocity]
+        a, still = acceleration[:-1], [self.end - self.start - steps * dt * start_velocity]
         if self.end_velocity is not None:
-            missing.append(self.end_velocity - start_velocity)
-        effect, cure = _effect(steps, dt, len(missing))
-        a += cure @ (np.array(missing) - effect @ a)
+            still.append(self.end_velocity - start_velocity)
+        # what accelerations do to the last position, and velocity
+        effect = np.stack([dt**2 * (steps - np.arange(steps) - 0.5), np.full(steps, dt)])
+        effect = effect[: len(still)]
+        a = a + effect.T @ np.linalg.solve(effect @ effect.T, np.array(still) - effect @ a)
         v = start_velocity + dt * np.vstack([np.zeros(2), np.cumsum(a, axis=0)])
         w = self.start + dt * np.vstack([np.zeros(2), np.cumsum((v[:-1] + v[1:]) / 2, axis=0)])
         return Trajectory(w, v, np.vstack([a, np.zeros(2)]))
@@ -235,24 +234,16 @@ class Kinematics:
         return self.integrate(v[0], a)
 
 
-@lru_cache(maxsize=16)
-def _effect(steps: int, dt: float, ends: int) -> tuple[Real, Real]:
-    """What accelerations do to the last position (and velocity), and its pseudo-inverse."""
-    to_position = dt**2 * (steps - np.arange(steps) - 0.5)
-    effect = np.stack([to_position, np.full(steps, dt)])[:ends]
-    return effect, np.linalg.pinv(effect)
-
-
 def kinematics(plan: Plan) -> Kinematics:
     """Return the feasible set of `plan`."""
     flight, vehicle = plan.flight, plan.vehicle
-    aircraft = plan.aircraft
-    rates = aircraft.flight_model().speed_rates
+    rates = plan.aircraft.flight_model().speed_rates
     fastest = math.hypot(plan.max_ground_speed, _WIND_IN_TURNS * math.hypot(*plan.wind))
 
-    def vector(value: tuple[float, float] | None) -> Real | None:
-        return None if value is None else np.array(value, dtype=float)
-
+    first, last = (
+        None if velocity is None else np.array(velocity, dtype=float)
+        for velocity in (flight.start_velocity, flight.end_velocity)
+    )
     return Kinematics(
         start=np.array(flight.start, dtype=float),
         end=np.array(flight.end, dtype=float),
@@ -260,8 +251,8 @@ def kinematics(plan: Plan) -> Kinematics:
         time_step=flight.time_step,
         max_speed=plan.max_ground_speed,
         max_acceleration=min(vehicle.max_acceleration, rates.turn * fastest),
-        start_velocity=vector(flight.start_velocity),
-        end_velocity=vector(flight.end_velocity),
+        start_velocity=first,
+        end_velocity=last,
         bound_first_acceleration=flight.bound_first_acceleration,
         min_speed=vehicle.min_speed,
         max_airspeed=plan.max_airspeed,

@@ -15,8 +15,8 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
-from faao_mav.optimizer.design import design
-from faao_mav.optimizer.problem import Link
+from faao_mav.optimizer.design import Link, design
+from faao_mav.optimizer.shadowing import arriving
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.channel import rayleigh
 from faao_mav.radio.mutual_information import mutual_information
@@ -78,15 +78,8 @@ def price(solution: Solution) -> MutualInformation:
     """
     if solution.problem.uav_user.steps is not None:
         raise InputError("radio.rates: rates of the radio's own have no mutual information")
-    problem = solution.problem
     (bs_uav, I_U, first), (uav_user, I_G, second) = (
-        _information(link, link.channel(solution.w, H_r), P)
-        for link, H_r, P in zip(
-            problem.links,
-            (solution.H_rB, solution.H_rU),
-            (solution.P_B, solution.P_U),
-            strict=True,
-        )
+        _information(link, link.channel(solution.w, H_r), P) for link, H_r, P in solution.hops
     )
     delivered = solution.relay(I_U, I_G, solution.shares).rate
     return MutualInformation(bs_uav, uav_user, delivered, max(first, second))
@@ -109,12 +102,8 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
     # Rounded: the order of equal rates, and so the sample, is the same whoever sums them.
     order = np.argsort(np.round(cutoff, _DECIMALS), kind="stable")
     part = order[np.linspace(0, len(H) - 1, count).astype(np.intp)]
-    sets = np.array(
-        [
-            mutual_information(H[part], P[part], link.modulation, link.noise, nodes=noises, seed=k)
-            for k in range(_SEEDS)
-        ]
-    )
+    at = H[part], P[part], link.modulation, link.noise
+    sets = np.array([mutual_information(*at, nodes=noises, seed=k) for k in range(_SEEDS)])
     sample = sets.mean(axis=0)
     powers = np.vander(cutoff / link.classes.bits, _DEGREE + 1)
     fit, *_ = np.linalg.lstsq(powers[part], sample)
@@ -144,7 +133,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     At most `_FRESH_SLOTS`, evenly apart, have draws of their own. What is delivered is the mean of
     flights that have one of the draws in each slot, forwarded with the planned shares.
     """
-    problem, how = solution.problem, design(solution.plan, solution.problem.precoder)
+    how = design(solution.plan, solution.problem.precoder)
     if not how.averaged:
         return None
     rng = np.random.default_rng([solution.plan.radio.seed, 1])
@@ -153,7 +142,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     chosen = np.arange(step // 2, slots, step)
     w, draws = solution.w[chosen], _FRESH_DRAWS if how.blind else 1
     found, rates = [], []
-    for link, P in zip(problem.links, (solution.P_B, solution.P_U), strict=True):
+    for link, _, P in solution.hops:
         nlos = rayleigh(rng, draws * len(w), link.receive, link.transmit)
         nlos = nlos.reshape(draws, len(w), link.receive, link.transmit)
         fresh = replace(link, nlos=nlos, gains=link.gains.in_slots(chosen))
@@ -168,9 +157,7 @@ def fresh_rates(solution: Solution) -> FreshRates | None:
     # each chosen slot stands for those about it
     nearest = np.minimum(np.arange(slots) // step, len(chosen) - 1)
     delivered = [
-        problem.relay.relayed(
-            I_U[nearest], I_G[nearest], problem.kinematics.time_step, solution.shares
-        ).rate
+        solution.relay(I_U[nearest], I_G[nearest], solution.shares).rate
         for I_U, I_G in zip(*rates, strict=True)
     ]
     larger = max(error for _, error in found)
@@ -205,21 +192,19 @@ def saturation(solution: Solution) -> Saturation:
     >>> saturation(optimize(plan)).saturated
     False
     """
-    problem = solution.problem
-    full = [np.full(len(solution.w), link.most) for link in problem.links]
+    problem, n = solution.problem, len(solution.w)
 
-    def maximised(I_U: Real, I_G: Real, shares: Real | None) -> float:
-        if (queue := problem.maximised_queue) is not None:
-            return queue.relayed(I_U, I_G, problem.kinematics.time_step, shares).rate
-        return float(min(I_U.mean(), I_G.mean()))
+    def maximised(rates: Real, shares: Real | None) -> float:
+        return float(arriving(problem, rates, shares)[-1]) / n
 
-    ceiling = maximised(full[0], full[1], None)
+    full = np.array([[link.most] for link in problem.links])
+    ceiling = maximised(full.repeat(n, axis=1), None)
 
     def enough(db: float) -> bool:
-        rates = solution.recomputed_slots(10 ** (-db / 10))
-        return maximised(*rates, solution.shares) >= SATURATED * ceiling
+        rates = np.array(solution.recomputed_slots(10 ** (-db / 10)))
+        return maximised(rates, solution.shares) >= SATURATED * ceiling
 
-    if maximised(solution.I_U, solution.I_G, solution.shares) < SATURATED * ceiling:
+    if maximised(np.stack([solution.I_U, solution.I_G]), solution.shares) < SATURATED * ceiling:
         return Saturation(ceiling, 0.0)
     low, high = 0.0, _MAX_SPARE_DB
     while high - low > _SPARE_ERROR:

@@ -63,24 +63,23 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     """
     problem = build_problem(plan)
     kin, field = problem.kinematics, rate_field(problem, design(plan))
-    kept = problem.constraints(kin)
-    limits, found = (*constraints_of(kin), *kept), dict[str, Trajectory]()
-    if near is not None and near.shape != (kin.slots, 2):
-        near = None
+    kept, slow = problem.constraints(kin), kin.min_speed > 0
+    near = None if near is None or near.shape != (kin.slots, 2) else near
+    again = None if near is None else kin.follow(near)
+    found = dict[str, Trajectory]()
     if problem.mapped:
-        again = None if near is None else kin.follow(near)
-        if again is not None and every_excess(kin, limits, again) <= ALLOWED:
-            found = {"known": again}
-        else:
+        if again is None or every_excess(kin, (*constraints_of(kin), *kept), again) > ALLOWED:
             along = next(flights_over_map(problem, field, _CELLS), None)
             found = {} if along is None else {"map": along}
+        else:
+            found = {"known": again}
     if not found:
         found = starts(kin, ("straight",), {}, problem.free_area, kept)
-    start, slow = next(iter(found.values())), kin.min_speed > 0
+    start = next(iter(found.values()))
     if problem.mapped:
         best = improved_over_map(problem, field, start, _ITERATIONS, ROUGHLY).trajectory
     else:
-        nearer = start if near is None else feasible(kin, start, near, limits)
+        nearer = start if near is None else feasible(kin, start, near, kept)
         best = maximize(
             kin,
             field,

@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import InputError, quote
 from faao_mav.files import read_archive, write_whole
+from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
@@ -53,6 +54,11 @@ class Rates:
 
     R_U: float
     R_G: float
+
+    @classmethod
+    def of(cls, I_U: Real, I_G: Real) -> "Rates":
+        """Return the means of the rates of slots (n,): with T = (N + 2) delta_t that is (10)."""
+        return cls(float(I_U.mean()), float(I_G.mean()))
 
     @property
     def R_avg(self) -> float:
@@ -98,8 +104,8 @@ class Solution:
     rate that is maximised (R_del, or R_avg where the plan is not causal) of the start and after
     each iteration.
     Fading that is averaged over has a leading axis of draws, and so have precoders that know it.
-    `converged` tells whether the method's own stopping rule ended it, `ending` says in words
-    what did; `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
+    `converged` tells whether the method's own stopping rule ended it, `ending` in words what did;
+    `starts` what each start of the direct method led to, bit/s/Hz, which is rough for
     those that were not followed to the end. `shares` (n,) of each slot are those in which a
     half-duplex relay receives; it sends in the rest. All rates are those that the plan counts,
     `optimizer.rate`: cutoff rates, or for a plan for the mutual information (5), (6), and `gain` is
@@ -167,8 +173,14 @@ class Solution:
 
     @property
     def rates(self) -> Rates:
-        """R_U, R_G and R_avg: with T = (N + 2) delta_t, (10) is the mean over the slots."""
-        return Rates(float(self.I_U.mean()), float(self.I_G.mean()))
+        """R_U, R_G and R_avg."""
+        return Rates.of(self.I_U, self.I_G)
+
+    @property
+    def hops(self) -> Iterator[tuple[Link, Complex, Complex]]:
+        """Both links, each with its fading H_r and its precoders."""
+        yield self.problem.bs_uav, self.H_rB, self.P_B
+        yield self.problem.uav_user, self.H_rU, self.P_U
 
     @cached_property
     def relayed(self) -> Relayed:
@@ -191,9 +203,7 @@ class Solution:
         Where the fading is averaged over it is that of the mean SNR. None without `radio.rates`.
         """
         found = []
-        for link, H_r, P in zip(
-            self.problem.links, (self.H_rB, self.H_rU), (self.P_B, self.P_U), strict=True
-        ):
+        for link, H_r, P in self.hops:
             if link.steps is None:
                 return None
             snr = link.snr(link.channel(self.w, H_r), P)
@@ -223,17 +233,15 @@ class Solution:
 
     def recomputed_slots(self, power: float = 1.0) -> tuple[Real, Real]:
         """Return I_U, I_G from w, the fading and the precoders alone, all powers times `power`."""
-        problem, scale = self.problem, np.sqrt(power)
-        near, far = problem.links
-        return (
-            near.mean_rates(near.channel(self.w, self.H_rB), scale * self.P_B),
-            far.mean_rates(far.channel(self.w, self.H_rU), scale * self.P_U),
+        scale = np.sqrt(power)
+        first, second = (
+            link.mean_rates(link.channel(self.w, H_r), scale * P) for link, H_r, P in self.hops
         )
+        return first, second
 
     def recomputed(self, power: float = 1.0) -> Rates:
         """Return the means of `recomputed_slots`."""
-        I_U, I_G = self.recomputed_slots(power)
-        return Rates(float(I_U.mean()), float(I_G.mean()))
+        return Rates.of(*self.recomputed_slots(power))
 
     def residuals(self) -> dict[str, float]:
         """Return by how much each constraint of (13) is missed, computed from the arrays alone.
@@ -242,31 +250,24 @@ class Solution:
         limits (13b), (13c) relative to W, and `energy` to its limit; the fading relative to what
         the plan's seed draws at w; the rates in bit/s/Hz. 0 where a constraint holds.
         """
-        problem, again = self.problem, self.recomputed()
+        problem, clearance = self.problem, self.clearance()
         found = problem.kinematics.residuals(self.trajectory)
         limit = problem.energy_limit(problem.kinematics)
         if limit is not None:
             found["energy"] = limit.excess(problem.kinematics, self.trajectory)
-        if problem.fence is not None:
-            clearance = problem.fence.clearance(self.trajectory, self.plan.flight.time_step)
+        if problem.fence is not None and clearance is not None:
             found["fence"] = max(0.0, problem.fence.margin - clearance)
-        found["(13b) power of the base station"] = _excess(self.P_B, problem.bs_uav.power)
-        found["(13c) power of the relay"] = _excess(self.P_U, problem.uav_user.power)
-        for name, link, H_r in zip(
-            ("(1) fading", "(2) fading"), problem.links, (self.H_rB, self.H_rU), strict=True
-        ):
-            found[name] = float(np.abs(H_r - link.small_scale(self.w)).max())
-        found["(9) rate"] = abs(again.R_avg - self.rates.R_avg)
+        powers = "(13b) power of the base station", "(13c) power of the relay"
+        for hop, (link, H_r, P) in enumerate(self.hops):
+            used = float(np.sum(np.abs(P) ** 2, axis=(-2, -1)).max())
+            found[powers[hop]] = max(0.0, used / link.power - 1)
+            found[f"({hop + 1}) fading"] = float(np.abs(H_r - link.small_scale(self.w)).max())
+        found["(9) rate"] = abs(self.recomputed().R_avg - self.rates.R_avg)
         return found
 
     def is_feasible(self, tolerance: float = 1e-6) -> bool:
         """Tell whether every one of the `residuals` is below `tolerance`, each in its own unit."""
         return max(self.residuals().values()) < tolerance
-
-
-def _excess(P: Complex, power: float) -> float:
-    used = np.sum(np.abs(P) ** 2, axis=(-2, -1))
-    return float(max(0.0, used.max() / power - 1))
 
 
 def make_solution(
@@ -277,14 +278,9 @@ def make_solution(
     *,
     converged: bool,
     ending: str,
-    starts: Mapping[str, float] | None = None,
 ) -> Solution:
     """Put an iterate together with its fading and rates."""
-    fading = [link.small_scale(flight.w) for link in problem.links]
-    I_U, I_G = (
-        link.mean_rates(link.channel(flight.w, H_r), P)
-        for link, H_r, P in zip(problem.links, fading, precoders, strict=True)
-    )
+    I_U, I_G = problem.rates(flight.w, precoders)
     return Solution(
         problem=problem,
         t=problem.kinematics.time_step * np.arange(len(flight.w), dtype=np.float64),
@@ -293,22 +289,18 @@ def make_solution(
         a=flight.a,
         P_B=precoders[0],
         P_U=precoders[1],
-        H_rB=fading[0],
-        H_rU=fading[1],
+        H_rB=problem.bs_uav.small_scale(flight.w),
+        H_rU=problem.uav_user.small_scale(flight.w),
         I_U=I_U,
         I_G=I_G,
         history=np.array(history),
         converged=converged,
         ending=ending,
-        starts=starts or {},
         shares=problem.relay.best_shares(I_U, I_G, problem.kinematics.time_step),
     )
 
 
 _ARRAYS = ("t", "w", "v", "a", "P_B", "P_U", "H_rB", "H_rU", "I_U", "I_G", "history")
-_RELAYED = ("received", "forwarded", "queue")
-_OPTIONAL = ("shares", "gain")
-_TEXTS = ("plan", "ending", "starts")
 
 
 def save_solution(
@@ -330,16 +322,15 @@ def save_solution(
     >>> bool(np.all(loaded.w == solution.w))
     True
     """
-    names = (*_ARRAYS, *_OPTIONAL, "converged", "ending")
-    values: dict[str, Any] = {name: getattr(solution, name) for name in names}
-    values |= {name: getattr(solution.rates, name) for name in ("R_avg", "R_U", "R_G")}
-    values |= {name: getattr(solution.relayed, name) for name in _RELAYED}
-    values |= {
-        "R_del": solution.delivered_rate,
-        "starts": json.dumps(dict(solution.starts)),
-        "plan": solution.plan.text,
-    }
-    values |= extra or {}
+    values: dict[str, Any] = {}
+    for source, names in (
+        (solution, (*_ARRAYS, "shares", "gain", "converged", "ending")),
+        (solution.rates, ("R_avg", "R_U", "R_G")),
+        (solution.relayed, ("received", "forwarded", "queue")),
+    ):
+        values |= {name: getattr(source, name) for name in names}
+    values |= {"R_del": solution.delivered_rate, "starts": json.dumps(dict(solution.starts))}
+    values |= {"plan": solution.plan.text} | dict(extra or {})
     buffer = io.BytesIO()
     np.savez(buffer, **{name: value for name, value in values.items() if value is not None})
     write_whole(path, buffer.getvalue())
@@ -355,15 +346,14 @@ def load_solution(path: str | Path) -> Solution:
     """
     from pydantic import TypeAdapter, ValidationError
 
-    required = (*_TEXTS, "converged", *_ARRAYS)
-    found = read_archive(path, (*required, *_OPTIONAL), "a result of faao-mission --save")
+    required = ("plan", "ending", "starts", "converged", *_ARRAYS)
+    found = read_archive(path, (*required, "shares", "gain"), "a result of faao-mission --save")
     for name in required:
         if name not in found:
             raise InputError(f"{path}: not a result of faao-mission --save: {name} is missing")
-    for name in _TEXTS:
-        _check(found[name], "U", (), f"{path}: {name}")
+    _check(found["plan"], "U", (), f"{path}: plan")
     plan = parse_plan(str(found["plan"]), f"{path} (plan)")
-    for name, (kinds, shape) in _expected(plan, len(found["history"].ravel())).items():
+    for name, (kinds, shape) in _expected(plan, found["history"].size).items():
         if name in found:
             _check(found[name], kinds, shape, f"{path}: {name}")
     shares = found.get("shares")
@@ -387,28 +377,28 @@ def load_solution(path: str | Path) -> Solution:
 
 
 def _expected(plan: Plan, steps: int) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Return kinds of numbers (NumPy's letters) and shape of each array of a solution of `plan`.
+    """Return kinds (NumPy's letters) and shape of each array of a solution of `plan`.
 
     `steps` are the entries of the history, of which there is one or more.
     """
     n, radio = plan.flight.slots, plan.radio
-    averaged = radio.fading == "ergodic"
-    draws = (radio.fading_samples,) if averaged else ()
+    base, relay, user = (
+        station.antennas for station in (radio.base_station, radio.relay, radio.ground_user)
+    )
+    draws = (radio.fading_samples,) if radio.fading == "ergodic" else ()
     known = draws if radio.csi == "instantaneous" else ()
-    found: dict[str, tuple[str, tuple[int, ...]]] = {
+    return {
+        **dict.fromkeys(("ending", "starts"), ("U", ())),
         "converged": ("b", ()),
         "gain": ("f", ()),
         "history": ("f", (max(1, steps),)),
+        **dict.fromkeys(("t", "I_U", "I_G", "shares"), ("f", (n,))),
+        **dict.fromkeys(("w", "v", "a"), ("f", (n, 2))),
+        "P_B": ("fc", (*known, n, base, base)),
+        "P_U": ("fc", (*known, n, relay, relay)),
+        "H_rB": ("fc", (*draws, n, relay, base)),
+        "H_rU": ("fc", (*draws, n, user, relay)),
     }
-    found |= dict.fromkeys(("t", "I_U", "I_G", "shares"), ("f", (n,)))
-    found |= dict.fromkeys(("w", "v", "a"), ("f", (n, 2)))
-    sent, relayed, heard = (
-        side.antennas for side in (radio.base_station, radio.relay, radio.ground_user)
-    )
-    for hop, receiving, sending in (("B", relayed, sent), ("U", heard, relayed)):
-        found[f"P_{hop}"] = ("fc", (*known, n, sending, sending))
-        found[f"H_r{hop}"] = ("fc", (*draws, n, receiving, sending))
-    return found
 
 
 def _check(array: "np.ndarray[Any, Any]", kinds: str, shape: tuple[int, ...], where: str) -> None:

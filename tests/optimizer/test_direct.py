@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MISSIONS, MakePlan, edited
+from conftest import MISSIONS, MakePlan
 
 from faao_mav.errors import PlanError
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.pricing import fresh_rates
 from faao_mav.optimizer.solution import Progress, load_solution, save_solution
-from faao_mav.plan import Plan, parse_plan, read_plan
+from faao_mav.plan import Plan, read_plan
 
 KNOWN = {"radio.fading": "realization"}
 
@@ -30,13 +29,9 @@ def faint_plan(small_plan: MakePlan) -> MakePlan:
     ("line_of_sight", "fading", "csi", "modulation"),
     [
         ("ula", "none", "statistical", "bpsk"),
-        ("all_ones", "none", "statistical", "qpsk"),
-        ("all_ones", "realization", "statistical", "bpsk"),
         ("ula", "realization", "statistical", "qpsk"),
-        ("ula", "ergodic", "statistical", "bpsk"),
         ("all_ones", "ergodic", "statistical", "qpsk"),
-        ("all_ones", "ergodic", "instantaneous", "bpsk"),
-        ("ula", "ergodic", "instantaneous", "qpsk"),
+        ("ula", "ergodic", "instantaneous", "bpsk"),
     ],
 )
 def test_a_solution_proves_itself(
@@ -78,7 +73,6 @@ def test_precoders_are_as_good_as_a_search_from_all_starts(
     "changes",
     [
         {"radio.line_of_sight": "all_ones"},
-        pytest.param({}, marks=pytest.mark.slow),
         {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
     ],
 )
@@ -96,25 +90,10 @@ def test_floor_and_ceiling_on_a_small_scenario(faint_plan: MakePlan) -> None:
     assert solution.rates.R_avg == pytest.approx(0.64235, rel=1e-3)
 
 
-def mirrored(plan: Plan) -> Plan:
-    """Swap the roles of base station and user, and the ends of the flight."""
-    base, user, flight = plan.radio.base_station, plan.radio.ground_user, plan.flight
-    return plan.changed(
-        {
-            "radio.base_station.position": user.position,
-            "radio.ground_user.position": base.position,
-            "flight.start": flight.end,
-            "flight.end": flight.start,
-        }
-    )
-
-
 @pytest.mark.parametrize(
     ("scheme", "fading"),
     [
         ("mmse", "realization"),
-        ("mrt", "ergodic"),
-        ("zf", "realization"),
         ("waterfilling", "ergodic"),
     ],
 )
@@ -126,17 +105,6 @@ def test_schemes_fly_their_own_route_and_stay_below_faao(
     other = optimize(faint_plan(changes | {"optimizer.precoder": scheme}))
     assert other.history[0] < other.rates.R_avg < best.rates.R_avg
     assert max(other.residuals().values()) < 1e-6
-
-
-@pytest.mark.parametrize("csi", ["statistical", "instantaneous"])
-def test_rates_on_fresh_fading_are_close_to_the_planned(faint_plan: MakePlan, csi: str) -> None:
-    solution = optimize(faint_plan({"radio.fading_samples": 64, "radio.csi": csi}))
-    fresh = fresh_rates(solution)
-    assert fresh is not None
-    assert 0 < fresh.error < 0.05
-    assert fresh.average == pytest.approx(solution.rates.R_avg, abs=0.06 + 4 * fresh.error)
-    assert fresh_rates(solution) == fresh
-    assert fresh_rates(optimize(faint_plan({"radio.fading": "none"}))) is None
 
 
 def test_ergodic_solutions_survive_saving(faint_plan: MakePlan, tmp_path: Any) -> None:
@@ -151,13 +119,10 @@ def test_ergodic_solutions_survive_saving(faint_plan: MakePlan, tmp_path: Any) -
 @pytest.mark.parametrize(
     "changes",
     [
-        {"radio.base_station.antennas": 1, "radio.relay.antennas": 1},
         {"radio.base_station.antennas": 3, "radio.ground_user.antennas": 1},
         {"radio.base_station.antennas": 3, "radio.relay.antennas": 3, **KNOWN},
         {"radio.base_station.antennas": 1, **KNOWN},
-        {"radio.rician_factor": 0},
-        {"flight.start_velocity": [0, 6], "flight.end_velocity": [5, -3]},
-        {"flight.start": [0, 0], "flight.end": [0, 0]},
+        {"radio.rician_factor": 0, "flight.start": [0, 0], "flight.end": [0, 0]},
         {"flight.duration": 1.5, "flight.end": [0.5, 49.5]},
         {"flight.duration": 8.5},  # hardly time to get there
         {"radio.base_station.power_dbm": -70, "radio.relay.power_dbm": -70},
@@ -182,15 +147,12 @@ def test_hopeless_links_still_get_a_sensible_route(faint_plan: MakePlan) -> None
 
 
 def test_saturated_links_get_a_short_route_at_once() -> None:
-    solution = optimize(replace_method(read_plan(MISSIONS / "paper.yaml")))
+    plan = read_plan(MISSIONS / "paper.yaml")
+    solution = optimize(plan.changed({"optimizer.method": "direct"}))
     assert solution.converged
     assert solution.rates.R_avg == pytest.approx(2, abs=1e-9)
     length = np.linalg.norm(np.diff(solution.w, axis=0), axis=1).sum()
     assert length == pytest.approx(np.hypot(350, 350), rel=1e-6)
-
-
-def replace_method(plan: Plan) -> Plan:
-    return plan.changed({"optimizer.method": "direct"})
 
 
 def test_same_seed_same_bytes(faint_plan: MakePlan) -> None:
@@ -216,10 +178,9 @@ def test_algorithm_1_refuses_what_it_cannot_do(faint_plan: MakePlan) -> None:
 
 
 def test_of_routes_with_equal_R_avg_the_one_that_delivers_most_is_taken() -> None:
-    text = (MISSIONS / "copter_relay.yaml").read_text()
-    changes = {"radio.causal": False, "flight.time_step": 1}
-    plan = parse_plan(edited(text, changes | {"optimizer.starts": ["bs-user", "user-bs"]}))
-    solution = optimize(plan)
+    changes: dict[str, Any] = {"radio.causal": False, "flight.time_step": 1}
+    changes["optimizer.starts"] = ["bs-user", "user-bs"]
+    solution = optimize(read_plan(MISSIONS / "copter_relay.yaml").changed(changes))
     by_station, by_user = solution.starts["bs-user"], solution.starts["user-bs"]
     assert by_station == pytest.approx(by_user, abs=1e-6)
     mirrored = solution.relay(solution.I_G[::-1], solution.I_U[::-1])

@@ -48,33 +48,29 @@ PLANE = COPTER.changed(
 
 
 def integrated(plan: Plan, flight: Trajectory) -> float:
-    """What a flight takes, J, by the formulas of the papers, slot by slot."""
-    total, dt, g = 0.0, plan.flight.time_step, 9.80665
-    wind = np.array(plan.wind)
-    for v, a in zip(flight.v - wind, flight.a, strict=True):
-        s = math.hypot(*v)
-        if plan.vehicle.type == "copter":
-            blade = 0.012 / 8 * 1.225 * 0.05 * 0.503 * 120**3
-            induced = 1.1 * 20**1.5 / math.sqrt(2 * 1.225 * 0.503)
-            r = s**2 / (2 * 20 / (2 * 1.225 * 0.503))
-            power = blade * (1 + 3 * s**2 / 120**2)
-            power += induced * math.sqrt(math.sqrt(1 + r**2) - r)
-            power += 0.6 * 1.225 * 0.05 * 0.503 * s**3 / 2
-        else:
-            c1, c2 = 90 / (2 * 12**3), 90 * 12 / 2
-            across = a @ a - (a @ v) ** 2 / s**2
-            power = c1 * s**3 + c2 / s * (1 + across / g**2) + 2.5 * max(0.0, float(a @ v))
-        total += dt * (power + plan.radio.relay.power)
-    return total
+    """What a flight takes, J, by the formulas of the papers."""
+    v, a, g = flight.v - np.array(plan.wind), flight.a, 9.80665
+    s = np.hypot(*v.T)
+    if plan.vehicle.type == "copter":
+        swept = 1.225 * 0.503
+        r = s**2 / (20 / swept)
+        power = 0.012 / 8 * swept * 0.05 * 120**3 * (1 + 3 * s**2 / 120**2)
+        power += 1.1 * 20**1.5 / math.sqrt(2 * swept) * np.sqrt(np.sqrt(1 + r**2) - r)
+        power += 0.6 * 0.05 * swept * s**3 / 2
+    else:
+        along, across = (a * v).sum(axis=1), a[:, 0] * v[:, 1] - a[:, 1] * v[:, 0]
+        power = 90 / (2 * 12**3) * s**3 + 90 * 12 / 2 / s * (1 + (across / s / g) ** 2)
+        power += 2.5 * np.maximum(0.0, along)
+    return plan.flight.time_step * float((power + plan.radio.relay.power).sum())
 
 
-@pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("plan", "wind"), [(COPTER, 0), (COPTER, 5), (PLANE, 0)])
-def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float, seed: int) -> None:
+def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float) -> None:
     plan = plan.changed({"site.wind": {"speed": wind, "from": 250}})
     problem = build_problem(plan)
-    flight = random_flight(problem.kinematics, seed)
-    assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
+    for seed in range(3):
+        flight = random_flight(problem.kinematics, seed)
+        assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
 
 
 def within(energy_wh: float) -> Solution:
@@ -86,10 +82,16 @@ def used(found: Solution) -> float:
     return found.energy_wh
 
 
-def test_less_energy_never_delivers_more() -> None:
-    most = used(direct(build_problem(COPTER)))
+@pytest.fixture(scope="module")
+def whole() -> Solution:
+    """The flight that may take what it will."""
+    return direct(build_problem(COPTER))
+
+
+def test_less_energy_never_delivers_more(whole: Solution) -> None:
+    most = used(whole)
     data = []
-    for share in (0.6, 0.8, 1.01):
+    for share in (0.7, 1.01):
         found = within(share * most)
         assert used(found) <= share * most * (1 + 1e-9)
         assert used(found) * 3600 == pytest.approx(integrated(COPTER, found.trajectory), rel=1e-9)
@@ -114,21 +116,20 @@ def test_the_best_duration_is_that_of_trying_all() -> None:
     assert len(found.w) * found.delivered_rate >= max(tried) * (1 - 1e-3)
 
 
-def test_the_least_energy_is_below_that_of_other_ways() -> None:
-    most = direct(build_problem(COPTER))
-    asked = 0.7 * (COPTER.megabytes(most.delivered_rate) or 0.0)
+def test_the_least_energy_is_below_that_of_other_ways(whole: Solution) -> None:
+    asked = 0.7 * (COPTER.megabytes(whole.delivered_rate) or 0.0)
     found, quickest = (
         optimize(COPTER.changed({"goal": {"deliver_mbytes": asked, "minimise": quantity}}))
         for quantity in ("energy", "duration")
     )
     assert found.delivered_rate >= found.plan.needed_rate
     assert used(found) < 0.99 * used(quickest)
-    assert used(found) < 0.99 * used(most)
+    assert used(found) < 0.99 * used(whole)
     assert found.least is not None
     below = found.least.below
     assert below is not None
     assert below.delivered_rate < below.plan.needed_rate
-    assert used(below) >= used(found) - 2e-3 * used(most)
+    assert used(below) >= used(found) - 2e-3 * used(whole)
     (label, told), *_ = result_lines(Result(found))
     assert label == "goal"
     assert told.startswith(f"least energy for {asked:.5g} megabytes: {used(found):.4g} Wh in ")

@@ -8,14 +8,13 @@ import cvxpy as cp
 import numpy as np
 import pytest
 from certificate import kkt_residual
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from scipy.linalg import block_diag
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.chain import Chain
 from faao_mav.optimizer.interior.constraint import Constraint, Grid, V
 from faao_mav.optimizer.interior.limits import Disc, EnergyLimit, SpeedChange, TurnRate
 from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.interior.newton import Chain
 from faao_mav.optimizer.interior.rewards import Goal, Queue, Rewards, Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.scaled import flight_variables
@@ -112,25 +111,28 @@ def reward(stage: Stage, flight: Trajectory) -> float:
     return float(stage(flight.w.T).value.mean(axis=1).min())
 
 
-HERE = {"start": np.array([100.0, 100.0]), "end": np.array([100.0, 100.0])}
+HERE = np.array([100.0, 100.0])
 DISTANCE = 350 * np.sqrt(2)
 ACTIVE = links(bpsk, 4e4, 4e4)
 
 SCENARIOS: dict[str, tuple[Kinematics, Stage]] = {
-    **{f"plane {duration} s": (plane(duration), ACTIVE) for duration in (10, 15, 50, 100)},
+    "plane 10 s": (plane(10), ACTIVE),
+    "plane 50 s": (plane(50), ACTIVE),
     "plane, log": (plane(50), links(gaussian, 1e6, 1e6)),
-    "plane, weak": (plane(50), links(bpsk, 4e3, 4e3)),
-    "copter": (copter(120), ACTIVE),
-    "copter, coarse": (copter(120, time_step=0.5), ACTIVE),
-    "copter, weak, tight": (copter(70), links(bpsk, 4e3, 4e3)),
-    "copter, closed": (copter(60, **HERE), ACTIVE),
-    "plane, closed": (plane(10, **HERE), ACTIVE),
+    "copter": (copter(120, time_step=0.5), ACTIVE),
+    "copter, weak, tight": (copter(70, time_step=0.5), links(bpsk, 4e3, 4e3)),
+    "copter, closed": (copter(60, time_step=0.5, start=HERE, end=HERE), ACTIVE),
     "given velocities": (
         plane(50, start_velocity=np.array([30.0, 40.0]), end_velocity=np.array([-20.0, 10.0])),
         ACTIVE,
     ),
     "velocities on the limit": (
-        copter(80, start_velocity=np.array([8.0, 0.0]), end_velocity=np.array([0.0, -8.0])),
+        copter(
+            80,
+            time_step=0.5,
+            start_velocity=np.array([8.0, 0.0]),
+            end_velocity=np.array([0.0, -8.0]),
+        ),
         ACTIVE,
     ),
     "hopeless": (plane(50), links(gaussian, 1e-7, 1e-7)),
@@ -139,10 +141,6 @@ SCENARIOS: dict[str, tuple[Kinematics, Stage]] = {
     "three links": (
         plane(50),
         links(bpsk, 4e4, 4e4, 4e4, stations=np.vstack([STATIONS, [[300.0, 0.0]]])),
-    ),
-    "far away": (
-        plane(300, time_step=0.5, start=np.array([0.0, 3500.0]), end=np.array([3500.0, 0.0])),
-        links(gaussian, 1.0, 1.0),
     ),
     "few slots": (plane(0.8, end=np.array([10.0, 350.0])), ACTIVE),
 }
@@ -159,12 +157,11 @@ def test_the_optimum_is_feasible_better_and_stationary(name: str) -> None:
     assert best.iterations <= 60
     assert best.value == reward(stage, best.trajectory)
     assert best.value > reward(stage, start)
-    if kin.slots <= 250:
-        # no flight within a metre of it gains more than this share of its reward
-        assert kkt_residual(kin, stage, best.trajectory) < 1e-5 * best.value
+    # no flight within a metre of it gains more than this share of its reward
+    assert kkt_residual(kin, stage, best.trajectory) < 1e-5 * best.value
 
 
-@pytest.mark.parametrize("room", [0, 1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("room", [0, 1e-6, 1e-3])
 @pytest.mark.parametrize("hover", [False, True])
 def test_without_room_the_result_is_still_feasible(room: float, hover: bool) -> None:
     """Durations that barely suffice: the set of flights has next to no interior."""
@@ -221,75 +218,25 @@ def test_concave_rewards_reach_the_global_optimum(make: Callable[..., Kinematics
     assert best.value == pytest.approx(float(problem.value), rel=2e-5)
 
 
-@pytest.mark.figures
-def test_the_published_rate_is_reached() -> None:
-    """Zeng and Zhang, IEEE TWC 2017, Table II: 9.53 Mbit/s; 9.5208 by CVXPY.
-
-    They keep at least 3 m/s over the station; here the aircraft may hover, which is worth little.
-    """
-    along = np.array([30.0, -30.0]) / np.sqrt(2)
-    kin = plane(
-        400,
-        start=np.array([0.0, 1000.0]),
-        end=np.array([1000.0, 0.0]),
-        start_velocity=along,
-        end_velocity=along,
-        bound_first_acceleration=True,
-    )
-    stage = links(gaussian, 1e7)
-    best = maximize(kin, stage, straight_flight(kin))
-    assert best.converged
-    assert best.value == pytest.approx(9.522, abs=0.002)
-
-
-def chain(rng: np.random.Generator, kin: Kinematics) -> tuple[Chain, Real, Real, Real]:
-    """The chain of `kin`, random symmetric blocks H (k, k, n), and H and A as dense matrices."""
-    grid = Grid.of(kin)
-    n, free = kin.slots, np.concatenate([grid.free, np.ones((3, kin.slots), dtype=np.bool_)])
+@pytest.mark.parametrize("make", [plane, copter])
+def test_the_sign_of_the_curvature_is_that_of_dense_eigenvalues(
+    make: Callable[..., Kinematics],
+) -> None:
+    rng, kin = np.random.default_rng(0), make(24, time_step=4.0)
+    grid, n = Grid.of(kin), kin.slots
+    free = np.concatenate([grid.free, np.ones((3, n), dtype=np.bool_)])
     goal = Queue(Rewards(ACTIVE, np.full((2, n), 80.0)), RelayQueue(), kin.time_step)
-    made = Chain(grid, goal, free)
-    root = rng.standard_normal((n, 9, 9))
-    H = (root + root.swapaxes(1, 2)).transpose(1, 2, 0)
-    dense, A = np.zeros((9 * n, 9 * n)), np.zeros((5 * (n - 1), 9 * n))
-    for k in range(n):
-        dense[9 * k : 9 * k + 9, 9 * k : 9 * k + 9] = H[..., k]
-    for k, x in enumerate(np.eye(9 * n)):
-        A[:, k] = made.missed(x.reshape(n, 9).T).T.ravel()
-    kept = free.T.ravel()
-    return made, H, dense[np.ix_(kept, kept)], A[:, kept]
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(3, 7), st.booleans())
-@settings(max_examples=25)
-def test_the_banded_matrix_is_the_dense_one(seed: int, n: int, hover: bool) -> None:
-    rng = np.random.default_rng(seed)
-    made, H, dense, A = chain(rng, (copter if hover else plane)(0.2 * n))
-    solve = made.factored(H)
-    assert solve is not None
-    right = rng.standard_normal((2, 14, n))
-    right[:, 9:, -1] = 0
-    found = solve(right)
-    kept = made.free.T.ravel()
-    whole = np.block([[dense, A.T], [A, np.zeros((len(A), len(A)))]])
-    for given_, solved in zip(right, found, strict=True):
-        of_x, of_y = given_[:9].T.ravel()[kept], given_[9:, :-1].T.ravel()
-        expected = np.linalg.solve(whole, np.append(of_x, of_y))
-        x, y = solved[:9].T.ravel()[kept], solved[9:, :-1].T.ravel()
-        assert np.append(x, y) == pytest.approx(expected, rel=1e-5, abs=1e-6)
-    y = rng.standard_normal((5, n - 1))
-    assert made.pull(y).T.ravel()[kept] == pytest.approx(A.T @ y.T.ravel())
-
-
-@given(st.integers(0, 2**32 - 1), st.booleans())
-@settings(max_examples=25)
-def test_the_sign_of_the_curvature_is_that_of_dense_eigenvalues(seed: int, hover: bool) -> None:
-    made, H, dense, A = chain(
-        np.random.default_rng(seed), (copter if hover else plane)(24, time_step=4.0)
-    )
+    chain, kept = Chain(grid, goal, free), free.T.ravel()
+    A = np.stack([chain.missed(x.reshape(n, 9).T).T.ravel() for x in np.eye(9 * n)], axis=1)
+    A = A[:, kept]
     null = np.linalg.svd(A)[2][np.linalg.matrix_rank(A) :].T
-    least = float(np.linalg.eigvalsh(null.T @ dense @ null).min())
-    for room in (0.5, -0.5):  # just on either side of zero
-        assert made.convex(H + (room - least) * np.eye(9)[..., None]) == (room > 0)
+    for _ in range(8):
+        root = rng.standard_normal((n, 9, 9))
+        H = (root + root.swapaxes(1, 2)).transpose(1, 2, 0)
+        dense = block_diag(*H.transpose(2, 0, 1))[np.ix_(kept, kept)]
+        least = float(np.linalg.eigvalsh(null.T @ dense @ null).min())
+        for room in (0.5, -0.5):  # just on either side of zero
+            assert chain.convex(H + (room - least) * np.eye(9)[..., None]) == (room > 0)
 
 
 CONSTRAINTS: list[Constraint] = [
@@ -324,8 +271,8 @@ def test_gradients_and_hessians_are_those_of_differences(constraint: Constraint)
 
 
 def test_a_long_flight_takes_time_in_proportion() -> None:
-    """4,000 slots in the iterations of 400, all in band storage."""
-    short, long = plane(80), plane(800)
+    """2,000 slots in the iterations of 200, all in band storage."""
+    short, long = plane(40), plane(400)
     stage = links(bowl, 1e-5, 2e-5)
     few = maximize(short, stage, straight_flight(short))
     many = maximize(long, stage, straight_flight(long))

@@ -183,6 +183,7 @@ def delivered(I_U: Real, I_G: Real, kind: str) -> float:
     return max(levels.values())
 
 
+@pytest.mark.usefixtures("coarse_map")
 @pytest.mark.parametrize("changes", [{}, {"radio.duplex": "half"}, {"radio.causal": False}])
 def test_a_flight_over_maps_is_told_by_the_maps_as_they_are(
     small_plan: MakePlan, changes: dict[str, Any]

@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 from certificate import kkt_residual
 from conftest import SMALL, MakePlan, edited
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from test_interior import STATIONS, bpsk, gaussian, links, plane, reward, worst
 
 from faao_mav.errors import InfeasibleError, PlanError
@@ -24,7 +22,6 @@ from faao_mav.workflow import Result
 
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
 PLACES = {"bs": STATIONS[0], "user": STATIONS[1]}
-AT_ONCE: Any = {"most_fall": math.inf, "most_power": math.inf}
 FREE = {"flight.start_velocity": "free", "flight.end_velocity": "free"}
 
 
@@ -38,14 +35,11 @@ def heading(speed: float, degrees: float) -> Any:
     return speed * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
 
 
-@given(
-    st.floats(1.0, 20.0),
-    st.integers(120, 800),
-    st.one_of(st.none(), st.floats(-180, 180)),
-    st.one_of(st.none(), st.floats(-180, 180)),
-    st.booleans(),
+@pytest.mark.parametrize(
+    ("least", "slots", "first", "last"),
+    [(1.0, 120, None, None), (8.0, 300, 30.0, -150.0), (13.0, 260, None, 90.0), (20.0, 500, 0, 0)],
 )
-@settings(max_examples=8)
+@pytest.mark.parametrize("closed", [False, True])
 def test_every_start_keeps_the_least_speed(
     least: float, slots: int, first: float | None, last: float | None, closed: bool
 ) -> None:
@@ -55,15 +49,8 @@ def test_every_start_keeps_the_least_speed(
         start_velocity=None if first is None else heading(max(least, 8.0), first),
         end_velocity=None if last is None else heading(max(least, 8.0), last),
     )
-    if closed:
-        kin = replace(kin, end=kin.start)
-    try:
-        found = starts(kin, NAMES, PLACES)
-    except InfeasibleError:
-        # only turns at both ends that leave no room between them are too hard
-        assert first is not None
-        assert last is not None
-        return
+    kin = replace(kin, end=kin.start) if closed else kin
+    found = starts(kin, NAMES, PLACES)
     assert "straight" in found
     for flight in found.values():
         assert "minimum speed" in kin.residuals(flight)
@@ -77,39 +64,23 @@ def test_it_circles_at_the_stations() -> None:
         assert (np.linalg.norm(flight.w - place, axis=1) < 60).sum() > 100
 
 
-@given(
-    st.lists(st.sampled_from([-1, 0, 1]), min_size=3, max_size=3),
-    st.lists(st.floats(3.0, 25.0), min_size=3, max_size=3),
-    st.floats(-180, 180),
-    st.booleans(),
-    st.booleans(),
-)
-@example([0, 1, 1], [7.0, 21.0, 8.0], 0.0, False, False)
-@example([1, 1, -1], [16.0, 16.0, 6.0], 0.0, True, False)
-@settings(max_examples=3)
-def test_no_refusal_where_a_dubins_path_keeps_every_limit(
-    sides: list[int], seconds: list[float], first: float, begins_free: bool, ends_free: bool
-) -> None:
-    speed, limit, step = 12.2, 2.1, 0.5
-    time = step * np.arange(int(sum(seconds) / step) + 1)
-    since = np.cumsum([0.0, *seconds[:2]])
+def test_no_refusal_where_a_dubins_path_keeps_every_limit() -> None:
+    sides, seconds, speed, limit, step = (0, 1, 1), (7.0, 21.0, 8.0), 12.2, 2.1, 0.5
+    time, since = step * np.arange(int(sum(seconds) / step) + 1), np.cumsum([0.0, *seconds[:2]])
     pieces = zip(sides, since, seconds, strict=True)
-    turning = sum(side * np.clip(time - t, 0, lasts) for side, t, lasts in pieces)
-    theta = np.radians(first) + 0.99 * limit / speed * turning
+    theta = sum(side * np.clip(time - t, 0, lasts) for side, t, lasts in pieces)
+    theta *= 0.99 * limit / speed
     v = speed * np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    kin = Kinematics(
+    kin = cruiser(
+        0,
+        11.5,
+        slots=time.size,
         start=np.zeros(2),
         end=step * (v[1:] + v[:-1]).sum(axis=0) / 2,
-        slots=time.size,
-        time_step=step,
         max_speed=15.0,
         max_acceleration=limit,
-        start_velocity=None if begins_free else v[0],
-        end_velocity=None if ends_free else v[-1],
-        bound_first_acceleration=True,
-        min_speed=11.5,
-        most_fall=0.8,
-        most_power=24.5,
+        start_velocity=v[0],
+        end_velocity=v[-1],
     )
     assert worst(kin, kin.follow(v)) < 1e-9
     assert worst(kin, straight_flight(kin)) < 1e-9
@@ -120,7 +91,7 @@ def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it(wind: Vector) -
     over_ground, through_air = (20.0 + math.hypot(*wind), 20.0) if any(wind) else (20.0, math.inf)
     kin = cruiser(100, 9.0, time_step=1.0, max_speed=over_ground)
     kin, stage = replace(kin, max_airspeed=through_air, wind=wind), links(bpsk, 4e4, 4e4)
-    at_once = replace(kin, **AT_ONCE)
+    at_once = replace(kin, most_fall=math.inf, most_power=math.inf)
     start = starts(kin, ["bs-user"], PLACES)["bs-user"]
     free = maximize(at_once, stage, start, tolerance=1e-4, max_iterations=150)
     best = maximize(kin, stage, start, tolerance=1e-4, max_iterations=150)
@@ -137,7 +108,7 @@ def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it(wind: Vector) -
 def test_too_little_room_for_a_turn_is_refused_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("faao_mav.optimizer.search.cruise._REPAIRS", 1)  # more are as hopeless
+    monkeypatch.setattr("faao_mav.optimizer.search.straight._REPAIRS", 1)  # more are as hopeless
     kin = cruiser(5, 20.0)
     kin = replace(kin, end=kin.start)
     with pytest.raises(InfeasibleError, match=r"at least 20 m/s \(vehicle\.min_speed\) for 5 s"):
@@ -149,7 +120,6 @@ def test_too_little_room_for_a_turn_is_refused_with_the_reason(
     [
         (3.0, (-45.0, -45.0)),
         (15.0, (None, None)),
-        (10.0, (0.0, 90.0)),
     ],
 )
 def test_the_optimum_keeps_the_least_speed(
@@ -199,16 +169,8 @@ PLANE = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}
 """Its guidance follows any turn of the plans here."""
 
 
-@pytest.mark.parametrize(
-    ("kind", "method"),
-    [
-        ("copter", "direct"),
-        ("plane", "direct"),
-        ("plane", "algorithm1"),
-        pytest.param("copter", "algorithm1", marks=pytest.mark.slow),
-    ],
-)
-def test_both_methods_solve_plans_with_it(small_plan: MakePlan, kind: str, method: str) -> None:
+@pytest.mark.parametrize("kind", ["copter", "plane"])
+def test_plans_with_it_are_solved(small_plan: MakePlan, kind: str) -> None:
     changes = {
         "vehicle.min_speed": 9.0,
         "vehicle.type": kind,
@@ -216,9 +178,8 @@ def test_both_methods_solve_plans_with_it(small_plan: MakePlan, kind: str, metho
         "flight.duration": 20,
         "radio.base_station.power_dbm": 0,
         "radio.relay.power_dbm": 0,
-        "radio.fading": "ergodic" if method == "direct" else "realization",
-        "optimizer.method": method,
-        "optimizer.max_iterations": 15 if method == "direct" else 2,
+        "radio.fading": "ergodic",
+        "optimizer.max_iterations": 15,
         **FREE,
     }
     solution = optimize(small_plan(changes))
@@ -233,23 +194,13 @@ def test_both_methods_solve_plans_with_it(small_plan: MakePlan, kind: str, metho
 
 
 @pytest.mark.parametrize(
-    ("changes", "parts"),
+    ("changes", "told"),
     [
-        ({"vehicle.min_speed": 25.0}, ["vehicle.min_speed: 25 m/s is above", "20 m/s"]),
-        (
-            {"vehicle.min_speed": 5.0},
-            ["flight.start_velocity: hover", "at least 5 m/s: give free or a velocity"],
-        ),
-        (
-            {"vehicle.min_speed": 5.0, **FREE, "flight.end_velocity": [3, 0]},
-            ["flight.end_velocity: [3.0, 0.0] is 3 m/s", "vehicle.min_speed"],
-        ),
-        ({"vehicle.min_speed": -1.0}, ["vehicle.min_speed", "from 0 m/s"]),
+        ({"vehicle.min_speed": 25.0}, r"vehicle\.min_speed: 25 m/s is above .*20 m/s"),
+        ({"vehicle.min_speed": 5.0}, r"flight\.start_velocity: hover .* at least 5 m/s: give free"),
+        ({"vehicle.min_speed": -1.0}, r"vehicle\.min_speed.* from 0 m/s"),
     ],
 )
-def test_plans_that_cannot_be_are_refused(changes: dict[str, Any], parts: list[str]) -> None:
-    with pytest.raises(PlanError) as caught:
-        parse_plan(edited(SMALL, changes), "small.yaml")
-    message = str(caught.value)
-    assert message.startswith("small.yaml: ")
-    assert [part for part in parts if part not in message] == []
+def test_plans_that_cannot_be_are_refused(changes: dict[str, Any], told: str) -> None:
+    with pytest.raises(PlanError, match=told):
+        parse_plan(edited(SMALL, changes))

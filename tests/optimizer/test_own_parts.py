@@ -52,9 +52,8 @@ def test_a_law_of_ones_own_is_as_the_plans() -> None:
     assert found.is_feasible(1e-6)
 
 
-@pytest.mark.parametrize("height", [30.0, 120.0])
-def test_slopes_and_turns_by_differences(height: float) -> None:
-    law = PathGain(1e-5, 2.4, (5.0, -30.0, 12.0))
+def test_slopes_and_turns_by_differences() -> None:
+    law, height = PathGain(1e-5, 2.4, (5.0, -30.0, 12.0)), 30.0
     away = np.random.default_rng(0).uniform(-300, 300, (2, 40))
     squared = np.sum(away**2, axis=0) + height**2
     for told, exact in zip(
@@ -71,6 +70,7 @@ def test_a_precoder_of_ones_own_is_as_the_scheme() -> None:
     assert found.delivered_rate == pytest.approx(wanted.delivered_rate, rel=1e-5)
 
 
+@pytest.mark.usefixtures("coarse_map")
 def test_a_rate_of_ones_own_is_planned_priced_and_bounded() -> None:
     quiet = plan(**{"radio.fading": "none"})
     result = plan_mission(quiet, rate=Shannon(), bound=True)

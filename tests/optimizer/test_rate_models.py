@@ -9,11 +9,10 @@ import pytest
 from conftest import MakePlan
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.design import Design, design
-from faao_mav.optimizer.problem import Link, build_problem
+from faao_mav.optimizer.design import Design, Link, design
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
-from faao_mav.optimizer.rates.field import rate_models
-from faao_mav.optimizer.rates.slot_rate import SlotRate
+from faao_mav.optimizer.rates.field import SlotRate, rate_models
 from faao_mav.optimizer.rates.table_rate import TableRate
 
 FARTHEST = 400.0
@@ -35,13 +34,26 @@ def places(link: Link, seed: int = 3) -> Real:
     return link.gains.station + rng.uniform(-150, 150, (20, 2))
 
 
-def coordinates(link: Link, w: Real) -> tuple[Real, Real]:
-    return link_coordinates(link, w.T)
-
-
 def derivatives(link: Link, rate: RateModel, w: Real) -> tuple[Real, Real]:
-    gradient, hessian = by_position(link, w.T, rate.partials(*coordinates(link, w)))
+    gradient, hessian = by_position(link, w.T, rate.partials(*link_coordinates(link, w.T)))
     return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
+
+
+def value_of(link: Link, rate: RateModel) -> Callable[[Real], Real]:
+    return lambda w: rate.value(*link_coordinates(link, w.T))
+
+
+def exactly(link: Link, wanted: Design, w: Real) -> Real:
+    H = link.channel(w)
+    return wanted.rate(link, H, wanted.precoders(link, H))
+
+
+def differs(link: Link, rate: RateModel, w: Real, *, curvature: float = 1e-2) -> None:
+    """Assert that slopes and curvatures at w (n, 2) are those of differences."""
+    value = value_of(link, rate)
+    gradient, hessian = derivatives(link, rate, w)
+    assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-5)
+    assert hessian == pytest.approx(hessian_by_differences(value, w), rel=curvature, abs=1e-4)
 
 
 @pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
@@ -51,133 +63,64 @@ def test_the_envelope_theorem(small_plan: MakePlan, line_of_sight: str, hop: int
     plan = small_plan({"radio.line_of_sight": line_of_sight, "radio.fading": "realization"})
     link = build_problem(plan).links[hop]
     w, rate = places(link), SlotRate(link, design(plan))
-
-    def best(at: Real) -> Real:
-        return rate.value(*coordinates(link, at))
-
+    best = value_of(link, rate)
     gradient, hessian = derivatives(link, rate, w)
     assert gradient == pytest.approx(gradient_by_differences(best, w), rel=1e-4, abs=1e-7)
     excess = hessian - hessian_by_differences(best, w)
     assert np.linalg.eigvalsh(excess).max() < 1e-5
 
 
-def test_rates_by_differences(small_plan: MakePlan) -> None:
-    plan = small_plan({"radio.fading": "realization", "optimizer.precoder": "mmse"})
-    link = build_problem(plan).bs_uav
-    w, rate = places(link), SlotRate(link, design(plan))
-    gradient, hessian = derivatives(link, rate, w)
-
-    def at(moved: Real) -> Real:
-        return rate.value(*coordinates(link, moved))
-
-    assert at(w) == pytest.approx(exactly(link, design(plan), w))
-    assert gradient == pytest.approx(gradient_by_differences(at, w), rel=1e-3, abs=1e-5)
-    assert hessian == pytest.approx(hessian_by_differences(at, w), rel=1e-2, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("fading", "precoder"), [("ergodic", "faao"), ("realization", "faao"), ("none", "mmse")]
-)
-def test_another_law_of_the_gain(small_plan: MakePlan, fading: str, precoder: str) -> None:
-    """Tables cover gains that do not fall with the distance, and slopes are the law's."""
-    law = {"exponent": 2.6, "elevation_db": [20, -60, 20]}
-    changes = {"radio.fading": fading, "optimizer.precoder": precoder, "radio.fading_samples": 4}
-    plan = small_plan(changes | {"radio.gain": law, "radio.ground_user.gain": {"exponent": 2.2}})
-    wanted, problem = design(plan), build_problem(plan)
-    assert [law.exponent for law in plan.radio.path_gains] == [2.6, 2.2]
-    for link in problem.links:
-        rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
-
-        def value(at: Real, rate: RateModel = rate, link: Link = link) -> Real:
-            return rate.value(*coordinates(link, at))
-
-        assert value(w) == pytest.approx(exactly(link, wanted, w), abs=2e-4)
-        gradient, hessian = derivatives(link, rate, w)
-        assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
-        assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+STEPS = {"snr_db": [2, 6, 11, 15], "bit_per_s_per_hz": [0.5, 1, 2, 3.5]}
+KINDS: dict[str, dict[str, Any]] = {
+    "best": {},
+    "zf": {"optimizer.precoder": "zf"},
+    "gaussian": {"optimizer.inputs": "gaussian", "radio.line_of_sight": "all_ones"},
+    "mrt, gaussian": {"optimizer.precoder": "mrt", "optimizer.inputs": "gaussian"},
+    "another law": {
+        "radio.gain": {"exponent": 2.6, "elevation_db": [20, -60, 20]},
+        "radio.ground_user.gain": {"exponent": 2.2},
+    },
+    "steps": {"radio.rates": STEPS},
+    "three antennas": {"radio.rates": STEPS, "radio.relay.antennas": 3},
+}
+FADINGS: dict[str, dict[str, Any]] = {
+    "none": {"radio.fading": "none"},
+    "known": {"radio.fading": "realization"},
+    "statistical": {"radio.fading_samples": 4},
+    "instantaneous": {"radio.fading_samples": 4, "radio.csi": "instantaneous"},
+}
 
 
 @pytest.mark.parametrize(
-    ("fading", "csi", "antennas"),
+    ("kind", "fading"),
     [
-        ("none", "statistical", 2),
-        ("realization", "statistical", 3),
-        ("ergodic", "statistical", 2),
-        ("ergodic", "instantaneous", 2),
+        *(("best", fading) for fading in FADINGS),
+        *(("zf", fading) for fading in FADINGS),
+        *(("gaussian", fading) for fading in ("none", "instantaneous")),
+        ("mrt, gaussian", "statistical"),
+        *(("another law", fading) for fading in ("statistical", "known")),
+        *(("steps", fading) for fading in ("none", "statistical", "instantaneous")),
+        ("three antennas", "known"),
     ],
 )
-def test_steps_of_a_radio_that_rise_are_one_table(
-    small_plan: MakePlan, fading: str, csi: str, antennas: int
+def test_models_have_the_rate_of_every_place_and_its_slopes(
+    small_plan: MakePlan, kind: str, fading: str
 ) -> None:
-    names = ("base_station", "relay")
-    changes: dict[str, Any] = {f"radio.{name}.antennas": antennas for name in names}
-    steps = {"snr_db": [2, 6, 11, 15], "bit_per_s_per_hz": [0.5, 1, 2, 3.5]}
-    changes |= {"radio.fading": fading, "radio.csi": csi, "radio.fading_samples": 4}
-    plan = small_plan(changes | {"radio.rates": steps})
-    wanted = design(plan)
-    link = build_problem(plan).bs_uav
-    assert link.steps is not None
-    link = replace(link, steps=link.steps.widened(3.0))
-    rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
-
-    def value(at: Real) -> Real:
-        return rate.value(*coordinates(link, at))
-
-    assert value(w) == pytest.approx(exactly(link, wanted, w), abs=1e-3)
-    gradient, hessian = derivatives(link, rate, w)
-    assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
-    assert hessian == pytest.approx(hessian_by_differences(value, w), rel=2e-2, abs=1e-4)
-
-
-def exactly(link: Link, wanted: Design, w: Real) -> Real:
-    H = link.channel(w)
-    return wanted.rate(link, H, wanted.precoders(link, H))
-
-
-@pytest.mark.parametrize(
-    ("precoder", "inputs", "line_of_sight"),
-    [
-        ("faao", "alphabet", "ula"),
-        ("faao", "alphabet", "all_ones"),
-        ("zf", "alphabet", "ula"),
-        ("faao", "gaussian", "all_ones"),
-        ("mrt", "gaussian", "ula"),
-    ],
-)
-@pytest.mark.parametrize(
-    ("fading", "csi"),
-    [("none", "statistical"), ("ergodic", "statistical"), ("ergodic", "instantaneous")],
-)
-def test_tables_hold_the_rate_at_every_place(
-    small_plan: MakePlan, line_of_sight: str, fading: str, csi: str, precoder: str, inputs: str
-) -> None:
-    plan = small_plan(
-        {
-            "radio.line_of_sight": line_of_sight,
-            "radio.fading": fading,
-            "radio.csi": csi,
-            "radio.fading_samples": 4,
-            "optimizer.precoder": precoder,
-            "optimizer.inputs": inputs,
-        }
-    )
+    plan = small_plan(KINDS[kind] | FADINGS[fading])
     wanted = design(plan)
     for link in build_problem(plan).links:
+        within = 2e-4
+        if link.steps is not None:
+            link, within = replace(link, steps=link.steps.widened(3.0)), 1e-3
         rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
-        tabled, exact = rate.value(*coordinates(link, w)), exactly(link, wanted, w)
-        assert tabled == pytest.approx(exact, abs=2e-4)
-        if wanted.optimal:
-            P = rate.initial_precoders(*coordinates(link, w))
+        exact = exactly(link, wanted, w)
+        assert value_of(link, rate)(w) == pytest.approx(exact, abs=within)
+        if wanted.optimal and link.steps is None:
+            P = rate.initial_precoders(*link_coordinates(link, w.T))
             assert P is not None
             P *= np.sqrt(link.power) / np.linalg.norm(P, axis=(-2, -1), keepdims=True)
             assert link.mean_rates(link.channel(w), P) == pytest.approx(exact, abs=2e-3)
-
-        def value(at: Real, rate: RateModel = rate, link: Link = link) -> Real:
-            return rate.value(*coordinates(link, at))
-
-        gradient, hessian = derivatives(link, rate, w)
-        assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
-        assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+        differs(link, rate, w, curvature=1e-2 if link.steps is None else 2e-2)
 
 
 @pytest.mark.parametrize(("fading", "precoder"), [("ergodic", "faao"), ("none", "zf")])
@@ -188,7 +131,7 @@ def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precode
             "optimizer.rate": "mutual_information",
             "optimizer.precoder": precoder,
             "radio.fading": fading,
-            "radio.fading_samples": 4,
+            "radio.fading_samples": 2,
             "radio.modulation": "qpsk",
             "radio.line_of_sight": "all_ones",
         }
@@ -196,17 +139,11 @@ def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precode
     wanted, link = design(plan), build_problem(plan).bs_uav
     rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
     assert isinstance(rate, TableRate)
-    at = coordinates(link, w)
+    at = link_coordinates(link, w.T)
     H = link.channel(w)
     P = rate.initial_precoders(*at) if wanted.optimal else wanted.precoders(link, H)
     assert rate.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
-    gradient, hessian = derivatives(link, rate, w)
-
-    def value(moved: Real) -> Real:
-        return rate.value(*coordinates(link, moved))
-
-    assert gradient == pytest.approx(gradient_by_differences(value, w), rel=1e-3, abs=1e-6)
-    assert hessian == pytest.approx(hessian_by_differences(value, w), rel=1e-2, abs=1e-4)
+    differs(link, rate, w)
 
 
 def test_the_best_rate_falls_with_the_distance_and_not_with_the_direction(

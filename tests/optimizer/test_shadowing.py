@@ -70,7 +70,7 @@ def test_a_toll_is_as_steep_as_the_variance(small_plan: MakePlan) -> None:
         np.testing.assert_allclose(at.hessian[2 * axis], bend, atol=1e-5)
 
 
-def under_drawn_fields(solution: Solution, count: int = 2000) -> Real:
+def under_drawn_fields(solution: Solution, count: int = 1000) -> Real:
     """What arrives under fields of the same law that are drawn by their covariance."""
     law, w = solution.plan.radio.gain, solution.w
     assert law.spread_db is not None
@@ -117,14 +117,6 @@ def test_without_a_spread_nothing_is_told_and_no_reliability_planned_for(
     for changes, told in (
         ({"radio.reliability": 0.9}, r"radio\.gain\.spread_db"),
         ({"radio.reliability": 1.0, "radio.gain.spread_db": 4}, r"0\.5 to 0\.99"),
-        (
-            {
-                "radio.reliability": 0.9,
-                "radio.gain.spread_db": 4,
-                "optimizer.method": "algorithm1",
-            },
-            "algorithm1",
-        ),
     ):
         with pytest.raises(PlanError, match=told):
             plan.changed(changes)

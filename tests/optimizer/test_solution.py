@@ -75,11 +75,9 @@ WORDS = "{'descr': '<U3', 'fortran_order': False, 'shape': (), }\n"
     [
         ("history", npy(HUGE), "not a result of faao-mission --save"),
         ("history", npy("(" * 500), "not a result of faao-mission --save"),
-        ("history", npy("{'descr': [], 'shape': None}"), "not a result"),
         ("history", npy(OBJECT, b"\x80\x04N."), "not a result"),
         ("history", b"no array", "not a result"),
         ("history", np.empty(0), r"history: float64 \(0,\); expected numbers \(1,\)"),
-        ("history", np.ones((2, 2)), r"history: float64 \(2, 2\)"),
         ("converged", np.array("yes"), r"converged: <U3 \(\); expected numbers \(\)"),
         ("plan", np.array(5), r"plan: int64 \(\); expected text"),
         ("ending", npy(WORDS, b"\xff" * 12), "not a result of faao-mission --save"),
@@ -178,16 +176,14 @@ def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None
     assert price(solution) == information
 
 
-@pytest.mark.parametrize("fading", ["none", "realization"])
-def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan, fading: str) -> None:
-    powers = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
+def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan) -> None:
+    changes = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
     few, many = (
-        price(optimize(small_plan(powers | {"radio.fading": fading, "flight.time_step": step})))
-        for step in (0.05, 0.005)  # 200 slots, and 2000, which are sampled
+        price(optimize(small_plan(changes | {"radio.fading": "none", "flight.time_step": step})))
+        for step in (0.05, 0.01)  # 200 slots, and 1000, which are sampled
     )
-    near = 0.01 if fading == "none" else 0.1  # another step has other draws
-    assert many.average == pytest.approx(few.average, abs=near)
-    assert many.delivered == pytest.approx(few.delivered, abs=near)
+    assert many.average == pytest.approx(few.average, abs=0.01)
+    assert many.delivered == pytest.approx(few.delivered, abs=0.01)
 
 
 def test_spare_power_is_what_could_be_saved(paper_plan: MakePlan) -> None:

@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 from conftest import MakePlan
-from hypothesis import given
-from hypothesis import strategies as st
 from test_interior import plane, worst
 
 from faao_mav.arrays import Real
@@ -26,8 +24,6 @@ PLANE = {
 }
 TURN = math.pi / (1.2 * 0.75 * 17)
 """rad/s: 1.2 look-aheads of ArduPlane's guidance, of NAVL1_DAMPING and NAVL1_PERIOD, a radian."""
-
-WINDS = st.tuples(st.floats(-30, 30), st.floats(-30, 30))
 
 
 def cruiser(duration: float, least: float, wind: Vector = (0.0, 0.0)) -> Kinematics:
@@ -51,17 +47,16 @@ def turned(solution: Solution) -> Real:
     return np.asarray(np.linalg.norm(solution.a[:-1], axis=1) / most)
 
 
-@given(WINDS, st.floats(1, 25), st.lists(st.floats(0, 1), min_size=6, max_size=6))
-def test_turns_allowed_in_the_air_are_allowed_over_ground(
-    wind: Vector, least: float, drawn: list[float]
-) -> None:
-    kin, share = cruiser(2, least, wind), np.array(drawn).reshape(2, 3)
-    size, theta = least + (25 - least) * share[0], 2 * np.pi * share[1]
-    x = size[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    allowed = kin.turn_limits(x + wind)
-    assert (kin.in_the_air().turn_limits(x) <= allowed * (1 + 1e-9)).all()
-    both = np.sqrt((size[1:] ** 2 + size[:-1] ** 2) / 2)
-    assert (TURN * both / 2 <= allowed * (1 + 1e-9)).all()
+def test_turns_allowed_in_the_air_are_allowed_over_ground() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        wind, least = tuple(rng.uniform(-30, 30, 2).tolist()), float(rng.uniform(1, 25))
+        kin, size, theta = cruiser(2, least, wind), rng.uniform(least, 25, 3), rng.uniform(0, 7, 3)
+        x = size[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+        allowed = kin.turn_limits(x + wind)
+        assert (kin.in_the_air().turn_limits(x) <= allowed * (1 + 1e-9)).all()
+        both = np.sqrt((size[1:] ** 2 + size[:-1] ** 2) / 2)
+        assert (TURN * both / 2 <= allowed * (1 + 1e-9)).all()
 
 
 def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: MakePlan) -> None:
@@ -80,13 +75,16 @@ def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: Make
 
 
 def test_algorithm_1_keeps_it_too(paper_plan: MakePlan) -> None:
-    plan = paper_plan(PLANE | {"vehicle.min_speed": 9, "optimizer.max_iterations": 3})
+    plan = paper_plan(PLANE | {"vehicle.min_speed": 9, "optimizer.max_iterations": 2})
     solution = optimize(plan)
-    assert solution.residuals()["turn"] < 1e-6
+    residuals = solution.residuals()
+    assert {"turn", "minimum speed", "fall of airspeed"} <= set(residuals)
+    assert max(residuals.values()) < 1e-6
+    assert solution.rates.R_avg > solution.history[0]
     assert turned(solution).max() > 0.99
 
 
-@pytest.mark.parametrize("least", [1, 3, 28])
+@pytest.mark.parametrize("least", [1, 28])
 def test_the_published_aircraft_flies_with_any_least_speed(
     small_plan: MakePlan, least: int
 ) -> None:

@@ -5,11 +5,9 @@ from dataclasses import replace
 import cvxpy as cp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from faao_mav.errors import InfeasibleError
-from faao_mav.optimizer.interior.maximize import maximize
+from faao_mav.optimizer.interior.maximize import Closeness, maximize
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
@@ -17,7 +15,6 @@ from faao_mav.optimizer.scaled import flight_variables, solve
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.search.straight import even_speed, straight_flight
-from faao_mav.optimizer.search.track import Closeness
 from faao_mav.plan import Wind
 from missions import plan_of
 
@@ -37,17 +34,15 @@ COPTER = Kinematics(
     max_airspeed=9.0,
 )
 FREE = replace(COPTER, start_velocity=None, end_velocity=None)
-winds = st.builds(Wind, speed=st.floats(0, 8.9), from_degrees=st.floats(0, 360)).map(
-    lambda wind: wind.velocity
-)
 
 
-@settings(max_examples=40, deadline=None)
-@given(winds, st.sampled_from([COPTER, FREE]))
+@pytest.mark.parametrize("kin", [COPTER, FREE])
+@pytest.mark.parametrize("speed", [3.0, 7.0, 8.9])
+@pytest.mark.parametrize("degrees", [20.0, 135.0, 250.0])
 def test_starts_keep_the_limits_or_there_is_none(
-    wind: tuple[float, float], kin: Kinematics
+    kin: Kinematics, speed: float, degrees: float
 ) -> None:
-    kin = replace(kin, wind=wind)
+    kin = replace(kin, wind=Wind(speed=speed, from_degrees=degrees).velocity)
     try:
         flights = starts(kin, ["straight", "bs", "user-bs"], STATIONS)
     except InfeasibleError:
@@ -58,7 +53,7 @@ def test_starts_keep_the_limits_or_there_is_none(
             assert max(kin.residuals(flight).values()) < 1e-7
 
 
-@pytest.mark.parametrize("wind", [(0.0, 0.0), (6.0, 0.0), (-3.0, 4.0), (-5.0, -6.0)])
+@pytest.mark.parametrize("wind", [(6.0, 0.0), (-5.0, -6.0)])
 def test_the_optimum_of_a_convex_problem_is_clarabels(wind: tuple[float, float]) -> None:
     kin = replace(FREE, wind=wind, end=np.array([30.0, 20.0]))
     path = np.tile([-60.0, 70.0], (kin.slots, 1))
@@ -71,7 +66,7 @@ def test_the_optimum_of_a_convex_problem_is_clarabels(wind: tuple[float, float])
     assert -best.value == pytest.approx(float(peer.value), rel=1e-4, abs=1e-6)
 
 
-@pytest.mark.parametrize("wind", [(0.0, 0.0), (4.0, -3.0), (-2.0, 1.0)])
+@pytest.mark.parametrize("wind", [(4.0, -3.0), (-2.0, 1.0)])
 def test_the_frame_of_the_air_is_calm(wind: tuple[float, float]) -> None:
     kin = replace(FREE, wind=wind, min_speed=3.0, max_speed=20.0)
     calm = kin.in_the_air()
@@ -90,9 +85,8 @@ CHANGES = {
 
 
 @pytest.mark.usefixtures("coarse_map")
-@pytest.mark.parametrize("wind", [{"speed": 6, "from": 250}, {"speed": 6, "from": 135}])
-def test_a_plan_in_wind_is_feasible_and_within_its_bound(wind: dict[str, float]) -> None:
-    plan = plan_of(CHANGES | {"site.wind": wind}, "ardupilot", "keep")
+def test_a_plan_in_wind_is_feasible_and_within_its_bound() -> None:
+    plan = plan_of(CHANGES | {"site.wind": {"speed": 6, "from": 250}}, "ardupilot", "keep")
     solution = optimize(plan)
     airspeed = np.linalg.norm(solution.v - plan.wind, axis=1)
     assert solution.converged

@@ -15,9 +15,8 @@ Cholesky factors; where the functions are then worse than modelled, a proximal t
 step. Repeated short steps mean that the iterates hug the limits: then the multipliers are centred
 anew.
 
-Files: `maximize` is the entry; `search` iterates, `newton` takes one step, `chain` is its matrix;
-`rewards` are what is maximised, `limits` and `fence` what is kept. To add a constraint is to write
-one class: see `constraint`.
+Files: `maximize` is the entry; `search` iterates, `newton` takes one step; `rewards` are what is
+maximised, `limits` what is kept. To add a constraint is to write one class: see `constraint`.
 
 Units inside: lengths in 100 m, speeds in v_max, accelerations in a_max, rewards summed over the
 slots and divided by the largest gradient at the start.

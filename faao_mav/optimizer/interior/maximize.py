@@ -9,10 +9,20 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import ALLOWED, A, Constraint, V, every_excess, unknowns
 from faao_mav.optimizer.interior.limits import Disc, SpeedChange, TurnRate
-from faao_mav.optimizer.interior.rewards import Queue, Rewards, Stage
+from faao_mav.optimizer.interior.rewards import Queue, Rewards, Stage, StageValues
 from faao_mav.optimizer.interior.search import COLD, SLOW, WARM, Search
-from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
+
+_TOLERANCE = 1e-4
+"""Tolerance of the search: a start need not be the nearest flight to the last metre. Chosen."""
+
+_MOST_STEPS = 200
+"""Steps after which a search ends. Chosen."""
+
+_LOOK = 5
+"""Steps after which it is looked again for a flight that keeps the limits, where any one will do.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +70,13 @@ def maximize(
     >>> best.converged, best.trajectory.w[20].round().tolist()
     (True, [50.0, 40.0])
     """
-    kept = (*constraints_of(kin), *constraints)
     rewards = Rewards(stage, start.w.T)
     first = objective(rewards.base, kin, relay)
     if rewards.flat:
         return LocalOptimum(start, first, 0, 0.0, True)
     search = Search(
         kin,
-        kept,
+        (*constraints_of(kin), *constraints),
         rewards if relay is None else Queue(rewards, relay, kin.time_step),
         unknowns(kin, start),
         tolerance=tolerance,
@@ -75,7 +84,7 @@ def maximize(
     )
     with np.errstate(all="ignore"):  # a step into the unknown is refused, not warned of
         converged = search.run(max_iterations)
-    flight = feasible(kin, start, search.v.T * kin.max_speed, kept)
+    flight = feasible(kin, start, search.v.T * kin.max_speed, constraints)
     value = objective(stage(flight.w.T).value, kin, relay)
     converged &= value > first - tolerance * abs(first)
     if not value >= first:
@@ -111,16 +120,14 @@ def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
 
 
 def feasible(
-    kin: Kinematics,
-    start: Trajectory,
-    v: Real,
-    constraints: Sequence[Constraint] | None = None,
+    kin: Kinematics, start: Trajectory, v: Real, constraints: Sequence[Constraint] = ()
 ) -> Trajectory:
     """Return the flight at the speeds v (n, 2), blended with `start` until it keeps the limits.
 
-    The share of `start` is the least of 0, 1e-9, 1e-8 ... 0.1 and 1 that will do.
+    These are `constraints` and those of `kin`. The share of `start` is the least of 0, 1e-9,
+    1e-8 ... 0.1 and 1 that will do.
     """
-    kept = constraints_of(kin) if constraints is None else constraints
+    kept = (*constraints_of(kin), *constraints)
     exact, allowed = kin.follow(v), max(ALLOWED, every_excess(kin, kept, start))
     for share in (0.0, *10.0 ** np.arange(-9, 0)):
         mixed = (
@@ -131,3 +138,45 @@ def feasible(
         if every_excess(kin, kept, blend) <= allowed:
             return blend
     return start
+
+
+@dataclass(frozen=True)
+class Closeness:
+    """The reward of being near a path r: -||w_n - r_n||^2 in units of `LENGTH`, r (n, 2) in m."""
+
+    path: Real
+
+    def __call__(self, w: Real) -> StageValues:
+        """Return the rewards at w (2, n), m."""
+        away = (w - self.path.T)[:, None] / LENGTH
+        value = -(away * away).sum(axis=0)
+        hessian = np.reshape((-2.0, 0.0, -2.0), (3, 1, 1)) / LENGTH**2
+        return StageValues(value, -2 * away / LENGTH, np.broadcast_to(hessian, (3, *value.shape)))
+
+
+def nearest_flight(
+    kin: Kinematics,
+    path: Real,
+    start: Trajectory,
+    constraints: Sequence[Constraint] = (),
+    *,
+    first: bool = False,
+) -> Trajectory | None:
+    """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
+
+    None where none is found that keeps `constraints` too. `start` is any flight of `kin`. With
+    `first` the way there ends with a flight that keeps them.
+    """
+    limits = constraints_of(kin)
+    for every in (limits, (*limits, *constraints)) if constraints else (limits,):
+        rewards = Rewards(Closeness(path), start.w.T)
+        if rewards.flat:
+            continue
+        search = Search(kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
+        for most in range(_LOOK, _MOST_STEPS + 1, _LOOK) if first else (_MOST_STEPS,):
+            with np.errstate(all="ignore"):
+                converged = search.run(most)
+            start = kin.follow(search.v.T * kin.max_speed)
+            if converged or (first and every_excess(kin, every, start) <= ALLOWED):
+                break
+    return start if every_excess(kin, (*limits, *constraints), start) <= ALLOWED else None

@@ -216,7 +216,7 @@ class Search:
         if not np.isfinite(step.x).all():
             return False
         at = system.at(it.at.x + share * step.x)
-        if not at.finite:
+        if not np.isfinite(at.values.sum() + at.slopes.sum()):
             return False
         s, z = it.s + share * step.s, it.z + share * step.z
         margin = s - at.values + (it.floor + share * step.floor) * system.floored

@@ -34,7 +34,7 @@ from typing import Protocol
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, products
-from faao_mav.optimizer.problem import Link
+from faao_mav.optimizer.design import Link
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,15 +5,76 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from faao_mav.arrays import Real
-from faao_mav.optimizer.design import Design
+from faao_mav.arrays import Complex, Real
+from faao_mav.optimizer.design import Design, Link
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
-from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
-from faao_mav.optimizer.rates.slot_rate import SlotRate
-from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
-from faao_mav.radio.gain import PER_DB, GainField
+from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.rates import RateModel, RatePartials, by_position, link_coordinates
+from faao_mav.optimizer.rates.table_rate import STEP, kind_of, table_rates
+from faao_mav.radio.gain import PER_DB
 from faao_mav.radio.rate_steps import RateSteps
+
+
+class SlotRate:
+    """The rate that counts at the precoders of `design`, made for every slot at every call.
+
+    Its derivatives are central differences. Precoders of a classical scheme follow the channel by a
+    rule of their own. The best ones are held fixed, but for turning with the line of sight: by the
+    envelope theorem the gradient is then exact, and the Hessian never exceeds the true one. Each
+    search starts from the precoders of the last call.
+    """
+
+    def __init__(self, link: Link, design: Design) -> None:
+        self.link, self.design = link, design
+        self._last: Complex | None = None
+
+    def value(self, gain_log: Real, cosine: Real) -> Real:
+        """Return the rate R of every slot, bits (..., n)."""
+        H = self._channel(gain_log, cosine)
+        return self.design.rate(self.link, H, self._precoders(H))
+
+    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
+        """Return the rate and its derivatives by l and u, bits (..., n)."""
+        rate, h = self.value, STEP
+        if self.design.optimal:
+            P = self.initial_precoders(gain_log, cosine)
+            steering = self._steering(cosine)
+
+            def rate(gain_log: Real, cosine: Real) -> Real:
+                turned = self._steering(cosine).conj() * steering * P
+                return self.link.draw_rates(self._channel(gain_log, cosine), turned)
+
+        def at(i: int, j: int) -> Real:
+            return rate(gain_log + i * h, cosine + j * h)
+
+        middle, up, down = at(0, 0), at(1, 0), at(-1, 0)
+        by_l, by_ll = (up - down) / (2 * h), (up - 2 * middle + down) / h**2
+        if not self.link.follows_position:
+            return RatePartials(middle, by_l, by_ll)
+        right, left = at(0, 1), at(0, -1)
+        by_lu = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * h**2)
+        by_u, by_uu = (right - left) / (2 * h), (right - 2 * middle + left) / h**2
+        return RatePartials(middle, by_l, by_ll, by_u, by_lu, by_uu)
+
+    def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
+        """Return the precoders (..., n, N_t, N_t) at l and u (..., n)."""
+        return self._precoders(self._channel(gain_log, cosine))
+
+    def _channel(self, gain_log: Real, cosine: Real) -> Complex:
+        H_r = self.link.fade(self.link.line_of_sight_at(cosine))
+        return np.asarray(np.exp(gain_log / 2)[..., None, None] * H_r)
+
+    def _steering(self, cosine: Real) -> Complex:
+        """Return the phases (..., n, N_t, 1) of the transmitting array at u (..., n)."""
+        return self.link.line_of_sight_at(cosine)[..., 0, :, None]
+
+    def _precoders(self, H: Complex) -> Complex:
+        near = self._last if self.design.optimal else None
+        if near is not None and near.shape[:-2] != H.shape[:-2]:  # those of the first flight
+            first = near.reshape(-1, *near.shape[-3:])[0]
+            near = np.broadcast_to(first, (*H.shape[:-2], *near.shape[-2:]))
+        self._last = P = self.design.precoders(self.link, H, start=near)
+        return P
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,16 +104,13 @@ class RateField:
 
     def smoothed(self) -> "RateField":
         """Return the rates over maps that are smooth: see `Grid.smoothed`."""
-        return self._of([link.gains.smoothed() for link in self.links])
+        links = (replace(link, gains=link.gains.smoothed()) for link in self.links)
+        return replace(self, links=tuple(links))
 
     def in_slot(self, slot: int) -> "RateField":
         """Return the rates everywhere with the stations where they are in a `slot`."""
-        return self._of([link.gains.in_slots(slot) for link in self.links])
-
-    def _of(self, gains: Sequence[GainField]) -> "RateField":
-        """Return the rates with other `gains` of the links."""
-        pairs = zip(self.links, gains, strict=True)
-        return replace(self, links=tuple(replace(link, gains=each) for link, each in pairs))
+        links = (replace(link, gains=link.gains.in_slots(slot)) for link in self.links)
+        return replace(self, links=tuple(links))
 
 
 _PLACES = 16
@@ -104,12 +162,9 @@ def rate_models(
 
     `farthest` are the largest horizontal distances from their stations, in metres, that they cover.
     """
-    tabled = [
-        (link, np.array(link.gains.extremes(distance)))
-        for link, distance in zip(links, farthest, strict=True)
-        if kind_of(link, design)
-    ]
-    tables = iter(table_rates(tabled, design))
+    spans = [link.gains.extremes(far) for link, far in zip(links, farthest, strict=True)]
+    tabled = [k for k, link in enumerate(links) if kind_of(link, design)]
+    tables = iter(table_rates([(links[k], np.array(spans[k])) for k in tabled], design))
     return tuple(
-        next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links
+        next(tables) if k in tabled else SlotRate(link, design) for k, link in enumerate(links)
     )

@@ -20,20 +20,16 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Complex, Flags, Integers, Real
-from faao_mav.optimizer.design import Design
-from faao_mav.optimizer.problem import Link
+from faao_mav.optimizer.design import Design, Link
 from faao_mav.optimizer.rates import RatePartials
 from faao_mav.radio.gain import PER_DB
 from faao_mav.radio.spline import Spline
 
 Kind: TypeAlias = Literal["curve", "surface", "modes"]
 
-_SPACING = 0.125
-"""Spacing of the grid of x, 0.54 dB. Chosen so that tables differ from exact rates by less than
-2e-4 bit in the tests (test_rate_models.py)."""
-
-_INFORMATION_SPACING = 0.25
-"""That for the mutual information, whose points take ten times as long. Chosen."""
+_SPACING = {"cutoff": 0.125, "mutual_information": 0.25}
+"""Spacing of the grid of x. Chosen so that tables differ from exact cutoff rates by less than 2e-4
+bit (test_rate_models.py); points of the mutual information take ten times as long."""
 
 _WHOLE = 1.0
 """The grid of x ends at multiples of this, so that plans and links share tables, and at these
@@ -43,7 +39,7 @@ the mutual information of known draws rises by 0.1 %, other rates by up to 0.02 
 _MARGIN = 0.1
 """Margin of the grid of x beyond the values at the sampled directions. Chosen."""
 
-_DIRECTIONS, _RATIOS, _INFORMATION_RATIOS = 65, 17, 9
+_DIRECTIONS, _RATIOS = 65, {"cutoff": 17, "mutual_information": 9}
 """Grid points of u, evenly from -1 to 1, and of κ, evenly from 0 to 1. Chosen."""
 
 _ALIKE = 0.3
@@ -57,8 +53,8 @@ _SAME = 1e-6
 """Gain, bit, below which a precoder found from another start is the same, in another form. Those of
 a kind then stay in one form along x. Chosen."""
 
-_STEP = 1e-3
-"""Step of u in the central differences of x and y, whose errors are about 1e-6."""
+STEP = 1e-3
+"""Step of l and u in central differences: derivatives of a few bits, or of x and y, err by 1e-5."""
 
 _KEPT = 8
 """Tables that are kept, the last ones. Chosen."""
@@ -98,9 +94,9 @@ class TableRate:
             shift, y = self.still
             value, by_l, by_ll = self.table.spline.by_x(gain_log + shift, y)
             return RatePartials(np.maximum(0.0, value), by_l, by_ll)
-        here, up, down = (_shifted(self.link, self.kind, cosine + h) for h in (0.0, _STEP, -_STEP))
-        x_u, y_u = ((a - b) / (2 * _STEP) for a, b in zip(up, down, strict=True))
-        x_uu, y_uu = ((a - 2 * m + b) / _STEP**2 for a, m, b in zip(up, here, down, strict=True))
+        here, up, down = (_shifted(self.link, self.kind, cosine + h) for h in (0.0, STEP, -STEP))
+        x_u, y_u = ((a - b) / (2 * STEP) for a, b in zip(up, down, strict=True))
+        x_uu, y_uu = ((a - 2 * m + b) / STEP**2 for a, m, b in zip(up, here, down, strict=True))
         value, by_x, by_y, by_xx, by_xy, by_yy = self.table.spline.by_both(
             gain_log + here[0], here[1]
         )
@@ -202,8 +198,7 @@ def _table(link: Link, kind: Kind, design: Design, low: float, high: float) -> T
 
     It depends on powers, noises and places by this range only.
     """
-    cutoff = link.measure == "cutoff"
-    every = round(_WHOLE / (_SPACING if cutoff else _INFORMATION_SPACING))
+    every = round(_WHOLE / _SPACING[link.measure])
     if link.steps is not None:
         every = max(every, math.ceil(_WHOLE * _PER_RISE / (PER_DB * link.steps.width)))
     first = math.floor((low - _MARGIN) / _WHOLE)
@@ -215,7 +210,7 @@ def _table(link: Link, kind: Kind, design: Design, low: float, high: float) -> T
         unit, design = replace(unit, nlos=None), replace(design, averaged=False, blind=False)
         modes = min(link.receive, link.transmit)
         if modes == 2 and link.steps is None:
-            y = np.linspace(0, 1, _RATIOS if cutoff else _INFORMATION_RATIOS)
+            y = np.linspace(0, 1, _RATIOS[link.measure])
         H = np.zeros((len(y), modes, link.transmit), dtype=np.complex128)
         H[:, 0, 0] = 1.0
         H[:, 1:, 1:2] = y[:, None, None]
@@ -273,7 +268,7 @@ def _searched(unit: Link, design: Design, H: Complex, columns: int) -> Complex:
             P[..., at[better], :, :] = tried[..., better, :, :]
 
     index = np.arange(points * columns).reshape(points, columns)
-    step = round(_WHOLE / (_SPACING if unit.measure == "cutoff" else _INFORMATION_SPACING))
+    step = round(_WHOLE / _SPACING[unit.measure])
     improve(index[::step].ravel(), None)
     lower, upper = index[:-step:step].ravel(), index[step::step].ravel()
     for _ in range(2):

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.design import design
-from faao_mav.optimizer.problem import Link, Problem
-from faao_mav.optimizer.rates.slot_rate import SlotRate
+from faao_mav.optimizer.design import Link, design
+from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.rates.field import SlotRate
 from faao_mav.optimizer.rates.table_rate import kind_of, table_rates
 
 _SEARCHED = 25
@@ -109,4 +109,5 @@ def _largest_singular_values(link: Link, slots: int) -> Real:
     # change of H_r, in which no phase changes by more than pi (antennas - 1) du.
     du = 1 / (len(directions) - 1) if len(directions) > 1 else 0.0
     phase = np.pi * (max(link.receive, link.transmit) - 1) * du
-    return np.asarray(largest + phase * link.los_share * np.sqrt(link.receive * link.transmit))
+    share = np.sqrt(link.rician_factor / (1 + link.rician_factor))
+    return np.asarray(largest + phase * share * np.sqrt(link.receive * link.transmit))

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.optimizer.problem import Link, Problem
+from faao_mav.optimizer.design import Link
+from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.best_rates import BestRates
 from faao_mav.optimizer.search.sweep import CORNER, Cells, cells_of, disc, largest_near
 from faao_mav.radio.gain import PER_DB, GainField
@@ -32,7 +33,7 @@ _COARSE_CELLS, _CELLS, _MAPPED_CELLS, _OWN_CELLS = 500, 60_000, 150_000, 20_000
 where every slot has rates of its own. Measured on a site with ridges: 9.8 % above the plan with
 60,000, 8.3 % with 120,000 in twice the time."""
 
-_COARSE_REACH, _REACH = 5.0, 12.0
+_COARSE_REACH, _REACH = 5.0, 10.0
 """Cells that a step reaches in either map, about. Chosen."""
 
 _APART = np.array([0.02, 0.06, 0.11, 0.18, 0.27, 0.36, 0.47])

@@ -16,7 +16,13 @@ from faao_mav.arrays import Real
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, Rows, W, every_excess
-from faao_mav.optimizer.interior.maximize import LocalOptimum, constraints_of, maximize, objective
+from faao_mav.optimizer.interior.maximize import (
+    LocalOptimum,
+    constraints_of,
+    maximize,
+    nearest_flight,
+    objective,
+)
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
@@ -24,7 +30,6 @@ from faao_mav.optimizer.search.map_bound import places_about
 from faao_mav.optimizer.search.queue_sweep import QueueSweep
 from faao_mav.optimizer.search.straight import straight_flight, with_stops
 from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
-from faao_mav.optimizer.search.track import nearest_flight
 
 CELLS, _LEVELS, _REACH = (3_000, 5_000), 30, 4.0
 """Cells of the map for each of the paths, levels of the queue, and cells that a step reaches.

@@ -2,10 +2,12 @@
 
 A start is a way, corner by corner, that is flown with a stop at each corner, or else by the flight
 nearest to it. Inside a fence ways are the shortest ones. An aircraft that cannot hover circles at
-the stations, and one that has to save energy on its way.
+the stations, and one that has to save energy on its way. All starts are improved roughly, side by
+side, which tells those to improve to the end; long flights on a coarse copy with fewer slots.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import cycle, islice, pairwise
 
 import numpy as np
@@ -15,10 +17,15 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, every_excess
 from faao_mav.optimizer.interior.limits import EnergyLimit
+from faao_mav.optimizer.interior.maximize import (
+    feasible,
+    maximize,
+    nearest_flight,
+)
+from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
-from faao_mav.optimizer.search.cruise import cruise_by
-from faao_mav.optimizer.search.straight import straight_flight, with_stops
-from faao_mav.optimizer.search.track import nearest_flight
+from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.search.straight import cruise_by, straight_flight, with_stops
 
 BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
 """What `global` stands for: paths found over the map gained nothing beside these (44 random plans,
@@ -40,6 +47,24 @@ _TURN_SHARE = 0.7
 """Share of the largest acceleration that circles of a start take; the rest is for the way. Chosen.
 """
 
+COARSE_SLOTS = 60
+"""Slots of the coarse copy of flights of at least twice as many: enough for the shape of a route.
+Chosen."""
+
+_ROUGH, _COARSE_TOLERANCE = 1e-3, 3e-3
+"""The tolerances on R_avg, bit/s/Hz, to which starts are improved before they are compared: of the
+flights themselves, and on the copy, which differs from them by more. Chosen."""
+
+_COARSE_ERROR = 5e-3
+"""The share of the best value within which starts are equally good on the copy. Chosen."""
+
+_SAME = 0.02
+"""The distance of flights that count as one, in the longer of their extents in x and y. Chosen."""
+
+EQUAL = 1e-6
+"""The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
+is then up to rounding, and differs from machine to machine. Chosen."""
+
 
 def starts(
     kin: Kinematics,
@@ -56,15 +81,9 @@ def starts(
     obstacle of the straight way on its other side, `straight 2` and on. Flights that were not found
     are left out. If none is left, the result is the straight flight.
 
-    Args:
-        kin: the feasible set.
-        names: the flights asked for.
-        stations: the positions (2,) of the stations by name, m.
-        area: where the path may be; None for everywhere.
-        fence: what flights have to keep to be there.
-
-    Raises:
-        InfeasibleError: there is no straight flight, and it was asked for or is the only one.
+    `stations` are their positions (2,) by name, m; `area` is where the path may be, None for
+    everywhere. Raises `InfeasibleError` where there is no straight flight, and it was asked for or
+    is the only one.
 
     >>> from faao_mav.optimizer.kinematics import Kinematics
     >>> kin = Kinematics(np.zeros(2), np.array([60.0, 0.0]), 41, 0.5, 8.0, 2.0, None, None, True)
@@ -170,20 +189,13 @@ def along(kin: Kinematics, way: Real, fence: Sequence[Constraint]) -> Trajectory
     """
     corners = list(way[1:-1])
     if not fence:
-        return _circling_by(kin, corners) if kin.min_speed and corners else with_stops(kin, corners)
+        return cruise_by(kin, corners) if kin.min_speed and corners else with_stops(kin, corners)
     if kin.min_speed == 0 or not corners:
         flight = with_stops(kin, corners)
         if flight is not None and every_excess(kin, fence, flight) <= ALLOWED:
             return flight
     path = points_along(way, np.linspace(0, 1, kin.slots))
     return nearest_flight(kin, path, straight_flight(kin), fence)
-
-
-def _circling_by(kin: Kinematics, stations: Sequence[Real]) -> Trajectory | None:
-    """Return the flight that circles at `stations`, with the wind: it is over them at half time."""
-    drift = kin.time_step * (kin.slots - 1) / 2 * np.array(kin.wind)
-    flight = cruise_by(kin.in_the_air(), [station - drift for station in stations])
-    return None if flight is None else kin.over_ground(flight)
 
 
 def sparing_starts(
@@ -208,3 +220,88 @@ def sparing_starts(
         if flight is not None:
             found[name] = flight
     return found
+
+
+def block_stage(stage: Stage, fine: int, slots: int) -> Stage:
+    """Return the rewards of `slots` positions, each standing for a block of the slots of `stage`.
+
+    (1 / slots) sum_m F_m is the mean of `stage` over its `fine` slots with w_n = w_m(n), so that
+    every draw of the fading counts.
+    """
+    block = np.rint(np.linspace(0, slots - 1, fine)).astype(int)
+    first = np.searchsorted(block, np.arange(slots))
+
+    def of_blocks(w: Real) -> StageValues:
+        at = stage(w[..., block])
+        parts = (at.value, at.gradient, at.hessian)
+        return StageValues(*(np.add.reduceat(x, first, axis=-1) * slots / fine for x in parts))
+
+    return of_blocks
+
+
+def improve_starts(
+    problem: Problem, stage: Stage, flights: Mapping[str, Trajectory], max_iterations: int
+) -> tuple[dict[str, Trajectory], list[str]]:
+    """Return the feasible `flights` improved roughly by `stage`, and the names of promising ones.
+
+    Not promising are flights that end clearly below the best, and those that end where an earlier
+    one does. No coarse copy is used for short flights, for those with a least speed or an energy
+    (the copy cannot make their circles).
+    """
+    kin = copy = problem.kinematics
+    reward, tolerance = stage, _ROUGH
+    if kin.slots >= 2 * COARSE_SLOTS and kin.min_speed == 0 and problem.energy == np.inf:
+        # Where a(0) has no bound, v(0) does not limit v(1). The first slot of the copy stands for
+        # several: on it v(0) is free and a(0) bounded.
+        copy = replace(
+            kin,
+            slots=COARSE_SLOTS,
+            time_step=kin.time_step * (kin.slots - 1) / (COARSE_SLOTS - 1),
+            start_velocity=kin.start_velocity if kin.bound_first_acceleration else None,
+            bound_first_acceleration=True,
+        )
+        reward, tolerance = block_stage(stage, kin.slots, COARSE_SLOTS), _COARSE_TOLERANCE
+    kept, optima = problem.constraints(copy), {}
+    for name, flight in flights.items():
+        start = flight if copy is kin else copy.follow(paced(copy, flight, kin.time_step))
+        optima[name] = maximize(
+            copy,
+            reward,
+            start,
+            constraints=kept,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+            relay=problem.maximised_queue,
+        )
+    best = max(optimum.value for optimum in optima.values())
+    least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
+    promising: list[str] = []
+    for name, optimum in optima.items():  # of flights that count as one the first
+        w = optimum.trajectory.w
+        near = _SAME * float(np.ptp(w, axis=0).max())
+        others = (optima[other].trajectory.w for other in promising)
+        if optimum.value >= least and all(np.abs(w - other).max() > near for other in others):
+            promising.append(name)
+    improved = {name: optimum.trajectory for name, optimum in optima.items()}
+    if copy is not kin:
+        limits = problem.constraints(kin)
+        for name, end in improved.items():
+            velocities = paced(kin, end, copy.time_step)
+            improved[name] = feasible(kin, flights[name], velocities, limits)
+    return improved, promising
+
+
+def paced(kin: Kinematics, flight: Trajectory, time_step: float) -> Real:
+    """Return the velocities (slots, 2) at which the path of `flight` takes the time of `kin`.
+
+    The slots of `flight` are of `time_step` s. The longer it takes the less speed and acceleration
+    it needs. With velocities of the ends that are zero or free, and in calm air, the rates along it
+    have nearly the same means.
+    """
+    faster = time_step * (len(flight.v) - 1) / (kin.time_step * (kin.slots - 1))
+    share, at = np.linspace(0, 1, len(flight.v)), np.linspace(0, 1, kin.slots)
+    velocities = faster * np.stack([np.interp(at, share, v) for v in flight.v.T], axis=1)
+    for n, given in ((0, kin.start_velocity), (-1, kin.end_velocity)):
+        if given is not None:
+            velocities[n] = given
+    return velocities
