@@ -1,4 +1,4 @@
-"""What no route can exceed: never below anything that can be flown, by the axis or whole."""
+"""What no route can exceed: never below anything that can be flown."""
 
 from typing import Any
 
@@ -9,78 +9,20 @@ from random_flights import random_flight
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.optimizer.rates.field import rate_field
+from faao_mav.optimizer.search.axis_bound import axis_bound
 from faao_mav.optimizer.search.best_rates import best_at, best_rates
-from faao_mav.optimizer.search.bound import AxisBound, axis_bound, upper_bound
+from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import map_bound
 from faao_mav.plan import read_plan
 
-FREE = {
-    "flight.start_velocity": "free",
-    "flight.end_velocity": "free",
-    "flight.bound_first_acceleration": False,
-}
-KINDS: dict[str, dict[str, Any]] = {
-    "R_avg": {},
-    "delivered": {"radio.causal": True},
-    "known draws": {"radio.fading": "realization"},
-    "free ends": FREE,
-    "fast": FREE | {"vehicle.max_speed": 40, "vehicle.max_acceleration": 3},
-}
 FAINT = {
     "radio.fading": "realization",
     "radio.base_station.power_dbm": 0,
     "radio.relay.power_dbm": 0,
 }
-
-
-def in_reach(cells: AxisBound, seed: int) -> None:
-    """Assert that every step of a random flight is one of the cells of the axis."""
-    kin, first = cells.problem.kinematics, cells.problem.bs_uav.gains.station
-    flight, instants = random_flight(kin, seed), cells.instants
-    n = np.minimum((instants / kin.time_step).astype(int), kin.slots - 2)
-    tau = (instants - kin.time_step * n)[:, None]
-    x = (flight.w[n] + tau * flight.v[n] + tau**2 / 2 * flight.a[n] - first) @ cells.axis
-    v = (flight.v[n] + tau * flight.a[n]) @ cells.axis
-    rows = np.clip(np.rint((x - cells.x[0]) / cells.side), 0, len(cells.x) - 1).astype(int)
-    columns = np.rint(v / cells.gap).astype(int) - int(cells.columns[0])
-    for k in np.random.default_rng(seed).permutation(len(instants) - 1)[:4]:
-        for here, there, sign in ((k, k + 1, 1), (k + 1, k, -1)):
-            values = np.full((1, len(cells.columns), len(cells.x)), -np.inf)
-            values[0, columns[there], rows[there]] = 1.0
-            assert cells.reached(values, sign)[0, columns[here], rows[here]] == 1.0
-            worth = cells.rewards(here, np.array([0.5]))
-            assert worth[0, columns[here], rows[here]] > -np.inf
-    away = np.abs((flight.w - first) @ np.array([-cells.axis[1], cells.axis[0]]))
-    assert (cells.across <= away + 1e-6).all()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_axis_misses_no_flight(
-    small_plan: MakePlan, monkeypatch: pytest.MonkeyPatch, kind: str
-) -> None:
-    faint = {"radio.base_station.power_dbm": 3, "radio.fading": "none"}
-    problem = build_problem(small_plan(faint | KINDS[kind]))
-    rates, field = best_rates(problem), rate_field(problem, design(problem.plan))
-    cells = AxisBound(problem, rates, 6)
-    limit = cells.bound([0.4, 0.5, 0.6])
-
-    def reached(w: Real) -> float:
-        return objective(field.value(w.T), problem.kinematics, problem.maximised_queue)
-
-    for seed in range(12):
-        in_reach(cells, seed)
-        assert reached(random_flight(problem.kinematics, seed).w) <= limit
-    best = reached(optimize(problem.plan).w)
-    assert best <= limit <= 1.6 * best
-    for instants in (1, 2, 3):
-        monkeypatch.setattr("faao_mav.optimizer.search.bound._MOST_INSTANTS", instants)
-        few = AxisBound(problem, rates, 6)
-        assert len(few.instants) == instants
-        assert best <= few.bound([0.5])
 
 
 def best_rate(problem: Problem, w: Real) -> float:
@@ -145,7 +87,7 @@ def test_a_known_plan_tightens_it_and_stays_below(
 
 
 @pytest.mark.usefixtures("coarse_map")
-def test_within_a_twenty_fifth_of_the_active_paper_plan() -> None:
+def test_within_a_fortieth_of_the_active_paper_plan() -> None:
     plan = read_plan(MISSIONS / "paper_active.yaml")
     plan = plan.changed(
         {"flight.duration": 20, "flight.time_step": 0.5, "optimizer.method": "direct"}
@@ -153,7 +95,7 @@ def test_within_a_twenty_fifth_of_the_active_paper_plan() -> None:
     found = optimize(plan).rates.R_avg
     limit = upper_bound(build_problem(plan), found)
     assert limit.exact
-    assert found <= limit.value <= 1.04 * found
+    assert found <= limit.value <= 1.025 * found
 
 
 @pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])

@@ -1,0 +1,307 @@
+"""An upper bound on every flight by prices on both hops and accelerations along one axis.
+
+Along the line through the stations a flight is a motion with |v| <= v_max and |a| <= a_max, and
+dynamic programming over cells of place and speed knows these limits. Across the line the flight
+is, in every slot, as near as the way from its start and the way to its end let it be. Cells, steps
+and rates are rounded outwards, so that no flight is missed: whatever the price lambda from 0 to 1
+of what the relay receives, no flight exceeds the largest sum of lambda I_U + (1 - lambda) I_G.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from faao_mav.arrays import Flags, Integers, Real
+from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.search.best_rates import BestRates
+from faao_mav.optimizer.search.map_bound import at_ends, best_price
+from faao_mav.optimizer.search.sweep import largest_within
+
+_BEYOND = 40.0
+"""How far the axis goes beyond stations and ends, m; farther out counts as there. Chosen."""
+
+_INTERVAL, _MOST_INSTANTS = 2.4, 50
+"""Time between instants, s, at least, and instants of a flight at most. Chosen."""
+
+_MOST_CELLS = 100_000
+"""Cells at an instant at most, about: where a_max is small the instants lie farther apart. With ten
+parts and four prices an array of them takes 30 MB. Chosen."""
+
+_PARTS = 4
+"""Places to the side of a cell at which rates are tabulated. Chosen."""
+
+_APART = (-0.05, -0.01, 0.01, 0.05)
+"""Prices of the bound beside that of the lowest bound in coarse cells. Several part the flights by
+where they are half-way: those near one station are worth less where the other is priced. Measured
+on `paper_active.yaml` at 10 dBm: the outer ones serve T = 50 s, the inner ones T = 150 s."""
+
+_COARSE, _FINE = 6, 12
+"""Cells of the speed that a_max crosses between instants: for the price, and the bound. Chosen."""
+
+_PASSED, _MERGED, _PARTED = 0.8, 2.5, 10
+"""When flights are parted by their place across the axis, over sqrt(distance / a_max); how many
+times as long the parts are kept apart; and how many there are. Measured with `paper_active.yaml`
+at 10 dBm, T = 50 s: the bound is 8 % above the plan without parts, 5 % with these."""
+
+_BEHIND, _BEFORE = 0.15, 0.55
+"""Limits of the parts, beyond and before the axis, over the distance of the end. Measured with the
+same plan: with 0.25 and 0.75 the bound is 0.3 % higher."""
+
+
+@dataclass(frozen=True)
+class AxisBound:
+    """Cells of place and speed along the axis through the stations, at K instants of a flight.
+
+    a_max crosses `speeds` cells of the speed between two instants. Row i of the cells is at the
+    place `low` + i `side`, column j at the speed j `gap`, from -v_max to v_max. With `side` = `gap`
+    h / 2 a step of h seconds from column i to column j goes i + j rows, and as far to either side
+    as the acceleration lets it. The first and the last row stand for all places beyond. Flights are
+    of `parts` kinds by where they pass across the axis.
+    """
+
+    problem: Problem
+    rates: BestRates
+    speeds: int
+    parts: int = 1
+
+    @cached_property
+    def times(self) -> tuple[Real, float, list[Integers]]:
+        """The instants (K,), s, the time h between them, and the slots nearest to each of them."""
+        kin = self.problem.kinematics
+        inner = np.arange(1, kin.slots - 1)
+        lasting = kin.time_step * len(inner)
+        extent = float(np.ptp(self.places[0])) + 2 * _BEYOND
+        crossed = 4 * self.speeds**2 * kin.max_speed * extent / kin.max_acceleration**2
+        least = max(_INTERVAL, (crossed / _MOST_CELLS) ** (1 / 3))
+        count = max(1, min(int(lasting / least), _MOST_INSTANTS, len(inner)))
+        h = lasting / count
+        instants: Real = kin.time_step / 2 + h * (np.arange(count, dtype=np.float64) + 0.5)
+        nearest = np.abs(instants[:, None] - kin.time_step * inner).argmin(axis=0)
+        return instants, h, [inner[nearest == k] for k in range(count)]
+
+    @cached_property
+    def gap(self) -> float:
+        """Width of the cells of the speed, m/s."""
+        return self.problem.kinematics.max_acceleration * self.times[1] / self.speeds
+
+    @cached_property
+    def side(self) -> float:
+        """Width of the cells of the place, m."""
+        return self.gap * self.times[1] / 2
+
+    @cached_property
+    def columns(self) -> Integers:
+        """The speeds of the cells, in widths."""
+        most = int(np.ceil(self.problem.kinematics.max_speed / self.gap))
+        return np.arange(-most, most + 1)
+
+    @cached_property
+    def axis(self) -> Real:
+        """The direction (2,) from the first station to the second."""
+        first, second = (link.gains.station for link in self.problem.links)
+        apart = float(np.hypot(*(second - first)))
+        return np.asarray((second - first) / apart if apart > 0 else np.array([1.0, 0.0]))
+
+    @cached_property
+    def places(self) -> tuple[Real, Real]:
+        """Start, end and both stations along and across the axis, (4,) each, m."""
+        kin, stations = self.problem.kinematics, [link.gains.station for link in self.problem.links]
+        c, s = self.axis
+        x, y = (np.array([kin.start, kin.end, *stations]) - stations[0]).T
+        return c * x + s * y, c * y - s * x
+
+    @cached_property
+    def x(self) -> Real:
+        """The places of the cells along the axis, m."""
+        along = self.places[0]
+        low = along.min() - _BEYOND
+        return np.asarray(
+            low + self.side * np.arange(int((along.max() + _BEYOND - low) / self.side) + 2)
+        )
+
+    @cached_property
+    def across(self) -> Real:
+        """The least distance from the axis that each slot can have (n,), m."""
+        ways = np.array(self.problem.kinematics.longest_ways())
+        ends = self.places[1][:2, None]
+        low, high = (ends - ways).max(axis=0), (ends + ways).min(axis=0)
+        return np.asarray(np.maximum(0.0, np.maximum(low, -high)))
+
+    @cached_property
+    def passed(self) -> tuple[float, list[Real]]:
+        """When flights are parted by their place y_c across the axis, s, and how near parts come.
+
+        From the start, and back from the end, (parts, n) each, m: a flight at y_1 at time s and at
+        y_c at t_c is, at t, within a_max |t - s| |t - t_c| / 2 of the line through both.
+        """
+        kin = self.problem.kinematics
+        n, dt, most = kin.slots, kin.time_step, kin.max_acceleration
+        base, ends = self.across, self.places[1][:2]
+        far = float(np.abs(ends).max())
+        when = max(2 * dt, min(_PASSED * np.sqrt(far / most), dt * (n - 1) / 4))
+        found = []
+        for end, bounded in zip(ends, (kin.bound_first_acceleration, True), strict=True):
+            y = float(end)
+            s, near = (0.0, 0.0) if bounded else (dt, kin.max_speed * dt)
+            inner = np.linspace(-_BEHIND, _BEFORE, self.parts - 1) * y
+            limits = np.sort([*inner, -np.inf, np.inf])
+            limits = np.clip(limits, y - kin.max_speed * when, y + kin.max_speed * when)
+            t = dt * np.arange(n)
+            share, bend = (t - s) / (when - s), most * np.abs((t - s) * (t - when)) / 2
+            off = near * np.abs(1 - share) + bend
+            line = y * (1 - share) + limits[:, None] * share
+            away = np.maximum(line[:-1] - off, -line[1:] - off)
+            found.append(np.maximum(0.0, np.where(t < s, 0.0, away)))
+        return when, [np.maximum(base, found[0]), np.maximum(base, found[1][:, ::-1])]
+
+    @cached_property
+    def steps(self) -> list[tuple[int, int]]:
+        """Changes of the column in one step, and how many rows each reaches to either side.
+
+        At a change d of the speed the way in h is the mean speed times h, give or take
+        a_max h² / 4 (1 - (d / (a_max h))²).
+        """
+        h, gain = self.times[1], self.problem.kinematics.max_acceleration * self.times[1]
+        found = []
+        for change in range(-self.speeds - 1, self.speeds + 2):
+            least = max(0, abs(change) - 1) * self.gap
+            bulge = max(0.0, gain * h / 4 * (1 - (least / gain) ** 2))
+            # half a cell of the place and of the speed at either end
+            found.append((change, int((bulge + self.gap * h / 2) / self.side + 1 + 1e-9)))
+        return found
+
+    def rewards(self, k: int, prices: Real, across: Real) -> Real:
+        """Return what the cells are worth at instant k, (parts, B, columns, rows).
+
+        At `prices` (B,), with flights that come as near to the axis as `across` (parts, n), m.
+        """
+        kin, (instants, _, blocks) = self.problem.kinematics, self.times
+        speed, rows = self.gap * self.columns, len(self.x)
+        found = np.zeros((2, len(across), 1, len(speed), rows))
+        part = self.side / _PARTS
+        for slot in blocks[k].tolist():
+            tau = slot * kin.time_step - float(instants[k])
+            off = (self.side + part + self.gap * abs(tau) + kin.max_acceleration * tau**2) / 2
+            shifts = np.rint(speed * tau / part).astype(np.intp)
+            most = int(np.abs(shifts).max())
+            table = self.x[0] + part * np.arange(-most, _PARTS * (rows - 1) + most + 1)
+            inner = most + shifts[:, None] + _PARTS * np.arange(rows)
+            for link, hop in enumerate(self.problem.links):
+                away = self.places[0][2 + link] - table
+                # beyond the first row, any place; beyond the last, any too
+                gone = np.maximum(0.0, np.stack([np.abs(away), away, -away]) - off)
+                near = np.hypot(gone[:, None], across[:, slot, None])
+                gain = hop.gains.most_between(near, np.array(self.problem.farthest(hop)))
+                rates = self.rates.at(link, slot, gain)
+                for columns, rate in zip(
+                    (slice(1, -1), slice(0, 1), slice(-1, None)), rates, strict=True
+                ):
+                    found[link, :, 0, :, columns] += rate[:, inner[:, columns]]
+        worth = prices[:, None, None] * found[0] + (1 - prices[:, None, None]) * found[1]
+        return np.where(self._alive(k), worth, -np.inf)
+
+    def _alive(self, k: int) -> Flags:
+        """Return whether a flight can be in each cell (columns, rows) at instant k."""
+        kin, t = self.problem.kinematics, float(self.times[0][k])
+        speed = self.gap * self.columns[:, None]
+        left = kin.time_step * (kin.slots - 1) - t
+        alive = np.ones((len(speed), len(self.x)), dtype=np.bool_)
+        for place, since, sign, velocity, bounded in (
+            (self.places[0][0], t, -1, kin.start_velocity, kin.bound_first_acceleration),
+            (self.places[0][1], left, 1, kin.end_velocity, True),
+        ):
+            # without the limit (13f) in slot 0 the first step goes v_max delta_t at most
+            tau = since if bounded else since - kin.time_step
+            off = kin.max_acceleration * tau**2 / 2 + (self.side + self.gap * tau) / 2
+            off += 0.0 if bounded else kin.max_speed * kin.time_step
+            ahead = self.x + sign * speed * tau - place
+            above, below = ahead <= off, ahead >= -off
+            above[:, 0] = below[:, -1] = True  # any place beyond
+            alive &= above & below
+            if velocity is not None and bounded:
+                change = np.abs(speed - float(velocity @ self.axis))
+                alive &= change <= kin.max_acceleration * tau + self.gap / 2
+        return alive
+
+    def reached(self, values: Real, sign: int) -> Real:
+        """Return the largest of `values` (B, columns, rows) within one step.
+
+        That is a step later with `sign` 1, a step earlier with -1.
+        """
+        # one after the other: the cache of a processor holds one of them, not all
+        return np.concatenate([self._reached(each[None], sign) for each in values])
+
+    def _reached(self, values: Real, sign: int) -> Real:
+        rows, most = values.shape[-1], int(self.columns[-1])
+        room = most + max(reach for _, reach in self.steps)
+        ahead = sign * self.columns[:, None]
+        source = np.clip(ahead + np.arange(-room, rows + room), 0, rows - 1)
+        sheared = np.take_along_axis(values, source[None], axis=-1)
+        best = np.full_like(sheared, -np.inf)
+        widened = largest_within(sheared, (reach for _, reach in self.steps))
+        up = np.maximum.accumulate(values, axis=-1)
+        down = np.maximum.accumulate(values[..., ::-1], axis=-1)[..., ::-1]
+        first, last = (np.full(values.shape[:-1], -np.inf) for _ in range(2))
+        for change, reach in self.steps:
+            here = slice(max(0, -change), len(self.columns) - max(0, change))
+            there = slice(max(0, change), len(self.columns) - max(0, -change))
+            np.maximum(best[:, here], widened[reach][:, there], out=best[:, here])
+            # from beyond an edge: any place up to what the edge itself reaches
+            way = sign * (self.columns[here] + self.columns[there])
+            number = np.arange(len(self.columns))[there]
+            top = np.clip(way + reach, 0, rows - 1)
+            bottom = np.clip(rows - 1 + way - reach, 0, rows - 1)
+            np.maximum(first[:, here], up[:, number, top], out=first[:, here])
+            np.maximum(last[:, here], down[:, number, bottom], out=last[:, here])
+        back = ahead + np.arange(rows) + room
+        found = np.take_along_axis(best, back[None], axis=-1)
+        found[..., 0], found[..., -1] = first, last
+        return found
+
+    def bound(self, prices: Sequence[float]) -> float:
+        """Return what no flight exceeds at `prices`, bit/s/Hz.
+
+        Through each cell half-way a flight is worth no more than at any of the prices.
+        """
+        p = np.clip(np.array(prices), 0.0, 1.0)
+        count = len(self.times[0])
+        before = self._since(range(count // 2 + 1), 0, p)
+        if count > count // 2 + 1:
+            before += self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
+        ends = np.array([at_ends(self.problem, self.rates, price) for price in p.tolist()])
+        through = before + ends[:, None, None]
+        return float(through.min(axis=0).max()) / self.problem.kinematics.slots
+
+    def _since(self, order: range, end: int, prices: Real) -> Real:
+        """Return the best sums (B, columns, rows) from one end on, at the last instant of `order`.
+
+        Of all parts of the flights the best counts, from some time after they are parted on.
+        """
+        kin, when, parts = self.problem.kinematics, *self.passed
+        values = np.empty((0, 0, 0, 0))
+        for k in order:
+            t = float(self.times[0][k])
+            since = kin.time_step * (kin.slots - 1) - t if end else t
+            across = parts[end] if since < _MERGED * when else self.across[None]
+            worth = self.rewards(k, prices, across)
+            if values.size:
+                if len(values) > len(across):
+                    values = values.max(axis=0, keepdims=True)
+                flat = values.reshape(-1, *values.shape[2:])
+                worth += self.reached(flat, 1 if end else -1).reshape(values.shape)
+            values = worth
+        return np.asarray(values.max(axis=0))
+
+
+def axis_bound(
+    problem: Problem, rates: BestRates, *, coarse: int = _COARSE, fine: int = _FINE
+) -> float:
+    """Return an upper bound on R_avg of all flights, bit/s/Hz, full duplex only.
+
+    `rates` are upper bounds on the best rates. With larger `fine` the bound is tighter;
+    time grows with its cube. The price is sought in cells of `coarse`.
+    """
+    price = best_price(AxisBound(problem, rates, coarse).bound)
+    return AxisBound(problem, rates, fine, _PARTED).bound([price + apart for apart in _APART])
