@@ -146,13 +146,12 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
     x, y = np.meshgrid(side, side, indexing="ij")
     stages = max(2, round(kin.time_step * kin.slots * kin.max_speed / (4 * step)))
     h, n = kin.time_step * kin.slots / stages, kin.slots / stages
-    w = np.stack([x.ravel(), y.ravel()], axis=1)
     rates = []
     for link in solution.problem.links:
-        H = link.channel(w)
+        H = link.channel(np.stack([x.ravel(), y.ravel()], axis=1))
         rates.append(n * link.draw_rates(H, link.best(H[:, None])).reshape(x.shape))
     along, reach = step * np.linspace(0, 1, 15), range(-5, 6)
-    steps = {  # and from where they pass over ground
+    steps = {  # and the cells from which they pass over no ground
         (i, j): np.max([heights(ridges, x + a * i, y + a * j) for a in along], axis=0)
         < plan.flight.altitude
         for i in reach
@@ -164,11 +163,7 @@ def best_by_place(solution: Solution, ridges: list[Ridge], cells: int = 4000) ->
     gap, value = level[1], np.zeros((60, *x.shape))
     far = [np.hypot(x - end[0], y - end[1]) for end in (kin.start, kin.end)]
     for k in range(stages - 1, -1, -1):
-        after = (
-            value
-            if k == stages - 1
-            else np.max([_moved(value, *step) for step in steps.items()], axis=0)
-        )
+        after = np.max([_moved(value, *step) for step in steps.items()], axis=0)
         found = []
         for share in (0.0, 0.5, 1.0) if plan.radio.duplex == "half" else (None,):
             come, gone = rates if share is None else (share * rates[0], (1 - share) * rates[1])
@@ -209,11 +204,7 @@ def main(seeds: list[int]) -> None:
             unaware = solution.relay(I_U, I_G).rate
             best = best_by_place(solution, site.ridges)
             bound = upper_bound(solution.problem, worth).value
-            steps = (
-                solution.w[:-1, None]
-                + np.linspace(0, 1, 20)[:, None] * np.diff(solution.w, axis=0)[:, None]
-            )
-            clear = site.plan.flight.altitude - heights(site.ridges, *steps.reshape(-1, 2).T).max()
+            clear = site.plan.flight.altitude - heights(site.ridges, *solution.w.T).max()
             gains.append(worth / max(unaware, 1e-3) - 1)
             print(
                 f"{seed:2}  {worth:.4f}  of the best by place {100 * worth / best:.1f} %  "
