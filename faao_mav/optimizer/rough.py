@@ -77,7 +77,9 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
         found = starts(kin, ("straight",), {}, problem.free_area, kept)
     start = next(iter(found.values()))
     if problem.mapped:
-        best = improved_over_map(problem, field, start, _ITERATIONS, ROUGHLY).trajectory
+        best = improved_over_map(
+            problem, field, start, _ITERATIONS, ROUGHLY, again=np.inf
+        ).trajectory
     else:
         nearer = start if near is None else feasible(kin, start, near, kept)
         best = maximize(

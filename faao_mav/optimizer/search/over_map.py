@@ -199,8 +199,12 @@ def improved_over_map(
     start: Trajectory,
     iterations: int = _ITERATIONS,
     searches: Sequence[tuple[float, float]] = _NARROWING,
+    again: float = _AGAIN,
 ) -> LocalOptimum:
-    """Return the best of `start` and of what searches in tubes about it end in, by `field`."""
+    """Return the best of `start` and of what searches in tubes about it end in, by `field`.
+
+    One that gains more than a share `again` is made once more.
+    """
     kin, relay = problem.kinematics, problem.maximised_queue
     smooth, side = field.smoothed(), _side(problem, CELLS[0])
     energy = problem.energy_limit(kin)
@@ -208,8 +212,7 @@ def improved_over_map(
     now, worth = start, _worth(problem, field, start)
     best = LocalOptimum(start, worth, 0, np.inf, False)
     for radius, spread in searches:
-        gain = np.inf
-        while gain > _AGAIN * worth:
+        while True:
             found = maximize(
                 kin,
                 Blurred(smooth, spread * side),
@@ -226,9 +229,10 @@ def improved_over_map(
             )
             now, before = found.trajectory, worth
             worth = _worth(problem, field, now)
-            gain = worth - before
             if worth > best.value:
                 best = replace(found, value=worth)
+            if worth - before <= again * before:
+                break
     return best
 
 
