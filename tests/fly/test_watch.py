@@ -5,10 +5,16 @@ from typing import Any
 import pytest
 from scenes import Scene, arms, starts
 from stages import staged
-from stations import VEHICLE
+from stations import FOREIGN, VEHICLE
 
-from faao_mav.wire.messages import CommandAck, CommandLong, Envelope
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
+from faao_mav.wire.messages import (
+    CommandAck,
+    CommandLong,
+    Envelope,
+    MissionAck,
+    MissionRequestList,
+)
+from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MavResult, MissionType
 
 KINDS = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 ARM, DISARM, START = (MavCommand.ARM, 1.0), (MavCommand.ARM, 0.0), (MavCommand.START, 0.0)
@@ -86,3 +92,22 @@ def test_an_interrupt_while_an_order_is_given_takes_it_back() -> None:
             scene.run()
         orders = [each for each in scene.watch.cancel(100.0) if isinstance(each, CommandLong)]
         assert [(each.command, each.param1) for each in orders] == then
+
+
+def test_what_is_answered_to_another_station_is_no_answer() -> None:
+    scene = staged("mission", "px4", {"until": "12"}, "0-5 loses arm")
+
+    def answer(now: float) -> None:
+        scene.client.on(Envelope(VEHICLE, CommandAck(FOREIGN, MavCommand.ARM, 4)), now)
+
+    assert scene.run([(4.0, answer)]) == "-"
+    assert scene.mock.armed
+
+
+def test_an_interrupt_while_it_is_read_again_ends_the_transfer() -> None:
+    scene = Scene("px4", arm=True)
+    scene.events = [(5.0, scene.interrupt)]
+    scene.loses(lambda message, _: isinstance(message, MissionRequestList))
+    assert scene.run() == "left"
+    assert scene.client.sent[-1] == MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
+    assert scene.orders == []

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
-from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry
+from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry, vehicle_of
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly_mission
@@ -28,7 +28,8 @@ from faao_mav.wire.messages import (
     Message,
     Statustext,
 )
-from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address
+from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address, MissionType
+from faao_mav.wire.wire_items import wire_items
 
 COPTER, ARDUPILOT, ARMED = 2, 3, 128
 BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
@@ -165,6 +166,26 @@ def test_two_vehicles_of_one_number_are_not_one(monkeypatch: pytest.MonkeyPatch)
         with pytest.raises(LinkError, match=told):
             job("udpin:0.0.0.0:1")
     assert [(mock.armed, mock.mission().items) for mock in vehicles.values()] == [(False, ())] * 2
+
+
+def test_nothing_is_started_that_has_a_namesake(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another of its number comes on the air once its mission has been read."""
+    mock, other, flight = a_mock(), a_mock(), Flight(a_mission(5))
+    mock.lists.replace(
+        MissionType.MISSION,
+        wire_items(flight.mission, MissionType.MISSION, vehicle_of("ardupilot")),
+    )
+    vehicles, to = {HERE: mock}, "udpin:0.0.0.0:1"
+    in_the_air(monkeypatch, vehicles)
+
+    def comes(_: object) -> None:
+        vehicles[ELSEWHERE] = other
+
+    report = fly_mission(flight, to, arm=True, watching=comes, note=lambda _: None)
+    assert report.ending is not None
+    assert report.ending.kind == "refused"
+    assert f"its number is used by another vehicle too, at {ELSEWHERE}" in report.ending.text
+    assert not mock.armed
 
 
 def test_what_comes_later_from_elsewhere_does_not_count(
