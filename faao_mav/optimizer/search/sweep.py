@@ -78,7 +78,8 @@ class Steps:
     """Steps from cell to cell of a grid (i, j), none of which passes through an obstacle.
 
     `rows` is what they reach; `near` (M,) are the cells with an obstacle within reach, by their
-    number; `targets` (M, S) the cells that each of them reaches, `ways` which of those steps pass.
+    number; `targets` (M, S) the cells that each of them reaches, `passable` which of these steps do
+    not meet one.
     """
 
     rows: list[tuple[int, int]]
@@ -113,10 +114,11 @@ class Steps:
     def best(self, values: Real) -> Real:
         """Return the largest of `values` (..., i, j) that a step from each cell leads to."""
         found = largest_near(values, self.rows)
-        if len(self.near):
-            flat = values.reshape(*values.shape[:-2], -1)
-            ahead = np.where(self.passable, flat[..., self.targets], -np.inf).max(axis=-1)
-            found.reshape(flat.shape)[..., self.near] = ahead
+        cells = values.shape[-2] * values.shape[-1]
+        # one map after the other: all at once they would fill gigabytes where steps reach far
+        for best, ahead in zip(found.reshape(-1, cells), values.reshape(-1, cells), strict=True):
+            if len(self.near):
+                best[self.near] = np.where(self.passable, ahead[self.targets], -np.inf).max(axis=1)
         return found
 
     def ahead(self, cell: int, shape: tuple[int, int]) -> Integers:
