@@ -35,6 +35,10 @@ CELLS, _LEVELS, _REACH = (3_000, 5_000), 30, 4.0
 """Cells of the map for each of the paths, levels of the queue, and cells that a step reaches.
 Measured on six sites with ridges: paths over cells of several sizes differ by up to 5 %."""
 
+_FARTHEST = 2 * _REACH
+"""Cells that a step past obstacles reaches at most: cells are larger where slots are long. Chosen:
+each step is looked at by itself, which at 33 cells takes minutes and gigabytes."""
+
 _BETWEEN = 0.4
 """Sides of a cell that a step may be longer than the speed allows: between centres of cells the
 directions are few. Chosen: without it paths are up to 7 % worse, with more they cannot be flown."""
@@ -165,6 +169,9 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         still = replace(problem, bs_uav=first, uav_user=second)
         field = rate_field(still, design(problem.plan, problem.precoder))
     places = np.vstack([places_about(problem, link) for link in problem.links])
+    if problem.free_area is not None:
+        slot = kin.max_speed * kin.time_step / _FARTHEST
+        cells = max(1, round(cells * min(1.0, _side(problem, cells) / slot) ** 2))
     way = float(kin.longest_ways()[0][-1])
     reach = float(np.clip(way / (100 * _side(problem, cells)), _REACH, 2 * _REACH))
     found = cells_of(kin, places, cells, reach, problem.free_area)
