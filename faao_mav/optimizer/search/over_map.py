@@ -214,7 +214,7 @@ def improved_over_map(
     """
     kin, relay = problem.kinematics, problem.maximised_queue
     smooth, side = field.smoothed(), _side(problem, CELLS[0])
-    energy, fence = problem.energy_limit(kin), problem.fenced(kin)
+    energy, limits = problem.energy_limit(kin), (*constraints_of(kin), *problem.fenced(kin))
 
     now, worth = start, _worth(problem, field, start)
     best = LocalOptimum(start, worth, 0, np.inf, False)
@@ -237,7 +237,7 @@ def improved_over_map(
             now, before = found.trajectory, worth
             worth = _worth(problem, field, now)
             # obstacles that count near the places of long slots are not all that chords meet
-            if worth > best.value and every_excess(kin, fence, now) <= ALLOWED:
+            if worth > best.value and every_excess(kin, limits, now) <= ALLOWED:
                 best = replace(found, value=worth)
             if worth - before <= again * before:
                 break
