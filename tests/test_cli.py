@@ -394,6 +394,13 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     assert run("--version").stdout.startswith("faao-mission ")
     validates = run("validate", "--help").stdout
     assert all(name in validates for name in (*autopilots(), *kinds()))
+    for command, *order in (  # what is asked for most stands first
+        ("link", "--station", "--out", "--power", "--map", "--terrain", "--report"),
+        ("study", "--vary", "--frontier", "--jobs", "--out"),
+        ("autopilot", "--listen", "--drop", "--signing-key"),
+    ):
+        listed = run(command, "--help").stdout.partition("Options:")[2]
+        assert order == sorted(order, key=listed.index)
     bare = run()
     assert (bare.exit_code, "Commands:" in bare.stderr) == (2, True)
 

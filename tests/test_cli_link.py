@@ -178,12 +178,14 @@ x.csv {FLAT} | expected LOG..., flights that were measured, or --terrain DEM
 {AT_900} --heights 60,x | --heights 60,x: expected metres
 {AT_900} | N47E008.hgt: cannot be read
 {FLAT} --report a.html | --report: is about logs
+{AT_900} --unit rssi | --unit: is about logs
+{AT_900} --calibrate 3=x | --calibrate: is about logs
 {FLAT} --map m.npz | --map: give --out, the file that names it
 {FLAT} --map m.csv --out a.yaml | --map m.csv: give a name
 flight.csv --station 1,2 | --station 1,2: expected LAT,LON,HEIGHT
 flight.csv --station 100,2,3 | expected LAT,LON,HEIGHT
 flight.csv --station 1,nan,3 | expected LAT,LON,HEIGHT
-flight.csv --station {PLACE} --unit rssi | --unit rssi: expected COLUMN=UNIT
+flight.csv --station {PLACE} --unit rssi= | --unit rssi=: expected COLUMN=UNIT
 flight.csv --station {PLACE} --calibrate 3=x | --calibrate 3=x: expected COUNT=DBM
 flight.csv --station {PLACE} --calibrate 3=4 --calibrate 3=5 | two different counts
 flight.csv --station {PLACE} --out x.txt | x.txt

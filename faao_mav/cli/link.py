@@ -39,10 +39,11 @@ class _Measured:
     @property
     def units(self) -> dict[str, str]:
         """The units of columns by their names."""
-        units = dict(each.partition("=")[::2] for each in self.unit or ())
-        for column, told in units.items():
-            if not told:
-                raise InputError(f"--unit {column}: expected COLUMN=UNIT, as in rssi=dbm")
+        units: dict[str, str] = {}
+        for each in self.unit or ():
+            column, _, units[column] = each.partition("=")
+            if not units[column]:
+                raise InputError(f"--unit {each}: expected COLUMN=UNIT, as in rssi=dbm")
         return units
 
     @property
@@ -173,14 +174,14 @@ def link(
         None, metavar="[LOG...]", help="Flights: .csv, or .bin, .tlog, .ulg with a radio's."
     ),
     out: cli.File = cli.option("LINK.yaml", "What to write: a plan's radio.gain."),
+    *,
+    measured: _Measured,
     map_file: cli.File = cli.option(
         "MAP.npz", "What the law leaves of the logs, as a map above it.", "--map"
     ),
+    over: _Terrain,
     report: cli.File = cli.option("PAGE.html", "Measured against fitted, on one page."),
     as_json: bool = cli.AS_JSON,
-    *,
-    measured: _Measured,
-    over: _Terrain,
 ) -> None:
     """Fit the law of a link's path gain to what was measured in flight, or to terrain.
 
@@ -213,8 +214,11 @@ def link(
     cli.check_outputs(outputs, {"--rates": measured.rates, **inputs})
     if bool(logs) == bool(over.terrain):
         raise InputError("expected LOG..., flights that were measured, or --terrain DEM")
-    if over.terrain and report is not None:
-        raise InputError("--report: is about logs; leave it out with --terrain")
+    about_logs = ("power", "noise", "rates", "unit", "calibrate")
+    given = {"--report": report} | {f"--{name}": getattr(measured, name) for name in about_logs}
+    for name, value in given.items():
+        if over.terrain and value is not None:
+            raise InputError(f"{name}: is about logs; leave it out with --terrain")
     from faao_mav.radio.fit import fit_link
     from faao_mav.radio.map_file import map_archive
     from faao_mav.report.link import fitted, link_page

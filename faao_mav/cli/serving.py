@@ -108,9 +108,9 @@ def autopilot(
     wind: str | None = cli.option("SPEED,FROM", "The wind that it flies in, m/s and degrees."),
     speedup: float = cli.option("X", "Fly X times as fast as predicted.", min=0.01, default=1.0),
     boot: float = cli.option("S", "Boot for S seconds.", min=0, default=0.0),
-    signing_key: cli.File = cli.SIGNING_KEY,
     *,
     faults: "Faults",
+    signing_key: cli.File = cli.SIGNING_KEY,
 ) -> None:
     """Run a mock autopilot: it takes, gives and flies missions like ArduPilot or PX4.
 

@@ -70,7 +70,8 @@ def exit_status() -> Iterator[None]:
 def with_options(**groups: Callable[..., Any]) -> Callable[..., Callable[..., None]]:
     """Give a command more options, and each of `groups` made of its own as one argument.
 
-    They are the parameters of a group, which is a function, or the fields of one, a dataclass.
+    They are the parameters of a group, which is a function, or the fields of one, a dataclass, and
+    stand in the help where the command takes the group.
     """
     theirs = {name: signature(group).parameters for name, group in groups.items()}
 
@@ -81,9 +82,10 @@ def with_options(**groups: Callable[..., Any]) -> Callable[..., Callable[..., No
                 given[name] = groups[name](**{option: given.pop(option) for option in options})
             command(**given)
 
-        own = signature(command).parameters.values()
-        parameters = [each for each in own if each.name not in groups]
-        parameters += [each for options in theirs.values() for each in options.values()]
+        parameters = []
+        for each in signature(command).parameters.values():
+            options = theirs.get(each.name, {each.name: each}).values()
+            parameters += [option.replace(kind=each.kind) for option in options]
         vars(run)["__signature__"] = signature(command).replace(parameters=parameters)
         run.__annotations__ = {each.name: each.annotation for each in parameters}
         return run

@@ -84,14 +84,14 @@ class _Asked:
 @cli.with_options(asked=_Asked)
 def study(
     plan_file: Path = typer.Argument(metavar="PLAN.yaml", help="The plan."),
+    *,
+    asked: _Asked,
     jobs: int = cli.option("N", "Processes; -1: one a core.", default=-1),
     cluster: str | None = cli.option(
         "ADDRESS", "A Dask scheduler, tcp://host:port, not processes."
     ),
     out: cli.File = cli.option("DIR", "Keep rows there as they finish; go on where it ended."),
     as_json: bool = cli.AS_JSON,
-    *,
-    asked: _Asked,
 ) -> None:
     """Optimise a plan with many values, schemes and seeds, and compare.
 
