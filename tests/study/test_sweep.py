@@ -3,12 +3,12 @@
 from fractions import Fraction
 
 import pytest
-from conftest import SMALL, edited
+from conftest import MISSIONS, SMALL, edited
 from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.errors import InputError, PlanError
-from faao_mav.plan import parse_plan
+from faao_mav.plan import parse_plan, read_plan
 from faao_mav.study import make_cases, parse_vary
 from faao_mav.study.sweep import MAX_ROWS, parse_schemes, parse_values
 
@@ -124,3 +124,14 @@ def test_the_study_of_a_plan() -> None:
     assert study.vary == {"flight.duration": (10, 12)}
     assert (study.schemes, study.seeds, study.figure) == (("faao", "zf"), 2, "delivered")
     assert parse_plan(SMALL).study is None
+
+
+@pytest.mark.parametrize("name", ["paper_fig3", "paper_fig4", "gaussian_cost"])
+def test_sample_studies_are_of_section_iv(name: str) -> None:
+    plan, paper = (read_plan(MISSIONS / f"{each}.yaml") for each in (name, "paper_active"))
+    assert plan.study is not None
+    assert (plan.flight.start, plan.flight.end) == (paper.flight.start, paper.flight.end)
+    assert (plan.vehicle, plan.powers) == (paper.vehicle, paper.powers)
+    assert plan.radio.relay.noise >= paper.radio.relay.noise
+    for case in make_cases(plan.text, vary=plan.study.vary, schemes=plan.study.schemes):
+        assert parse_plan(case.text).flight.altitude == 100
