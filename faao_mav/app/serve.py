@@ -232,7 +232,8 @@ def _bound(host: str, port: int) -> socket.socket:
         both = family == socket.AF_INET6  # an address of all: of IPv4 too
         return socket.create_server(address, family=family, dualstack_ipv6=both)
     except OSError as error:
-        raise InputError(f"--host {host} --port {port}: {error.strerror or error}") from None
+        why, *_ = (error.strerror or str(error)).split(" (while ")  # Python adds the address
+        raise InputError(f"--host {host} --port {port}: {why}") from None
 
 
 @contextlib.contextmanager
