@@ -77,9 +77,7 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
         found = starts(kin, ("straight",), {}, problem.free_area, kept)
     start = next(iter(found.values()))
     if problem.mapped:
-        best = improved_over_map(
-            problem, field, start, _ITERATIONS, ROUGHLY, again=np.inf
-        ).trajectory
+        best = improved_over_map(problem, field, start, _ITERATIONS, ROUGHLY, most=1).trajectory
     else:
         nearer = start if near is None else feasible(kin, start, near, kept)
         best = maximize(

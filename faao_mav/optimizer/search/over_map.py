@@ -61,9 +61,9 @@ ROUGHLY = _NARROWING[1:2]
 _ITERATIONS = 120
 """Steps of each of these searches at most. Measured: with 30 one of five sites ends 2 % lower."""
 
-_AGAIN = 5e-3
-"""The gain, in shares of what there is, above which a search is made again from where it ended: a
-flight that stops at bends has to move farther than a tube is wide. Chosen."""
+_AGAIN, _MOST = 5e-3, 20
+"""The gain, in shares of what there is, above which a search is made again from where it ended, and
+how often at most: a flight that stops at bends has to move farther than a tube is wide. Chosen."""
 
 _TOLERANCE = 1e-4
 """Their tolerance, bit/s/Hz. Chosen."""
@@ -206,11 +206,11 @@ def improved_over_map(
     start: Trajectory,
     iterations: int = _ITERATIONS,
     searches: Sequence[tuple[float, float]] = _NARROWING,
-    again: float = _AGAIN,
+    most: int = _MOST,
 ) -> LocalOptimum:
     """Return the best of `start` and of what searches in tubes about it end in, by `field`.
 
-    One that gains more than a share `again` is made once more.
+    One that gains much is made again, at `most` so often.
     """
     kin, relay = problem.kinematics, problem.maximised_queue
     smooth, side = field.smoothed(), _side(problem, CELLS[0])
@@ -219,7 +219,7 @@ def improved_over_map(
     now, worth = start, _worth(problem, field, start)
     best = LocalOptimum(start, worth, 0, np.inf, False)
     for radius, spread in searches:
-        while True:
+        for _ in range(most):
             found = maximize(
                 kin,
                 Blurred(smooth, spread * side),
@@ -239,7 +239,7 @@ def improved_over_map(
             # obstacles that count near the places of long slots are not all that chords meet
             if worth > best.value and every_excess(kin, limits, now) <= ALLOWED:
                 best = replace(found, value=worth)
-            if worth - before <= again * before:
+            if worth - before <= _AGAIN * before:
                 break
     return best
 
