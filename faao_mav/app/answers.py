@@ -14,7 +14,6 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError, PlanError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import Area
 from faao_mav.optimizer.rough import RoughFlight, rough_flight
 from faao_mav.optimizer.shadowing import Shadowed
@@ -103,7 +102,7 @@ def _answered(text: str, source: str, solve: Callable[[Plan], RoughFlight | Resu
 
 def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str, Any]:
     plan = flight.plan
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    frame = plan.origin.frame
 
     def degrees(places: Real) -> list[list[float]]:
         pairs: list[list[float]] = np.stack(frame.to_geodetic(places), axis=1).round(8).tolist()

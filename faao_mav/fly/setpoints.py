@@ -10,7 +10,6 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import AutopilotFamily
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan.sections import Origin
 from faao_mav.wire import messages
@@ -179,7 +178,7 @@ class OwnFrame:
 
     def __init__(self, family: AutopilotFamily, plan_origin: Origin) -> None:
         self._family = family
-        self._plans = LocalFrame(plan_origin.latitude, plan_origin.longitude)
+        self._plans = plan_origin.frame
         self.origin: messages.GpsGlobalOrigin | None = None
         self.home: int | None = None
 

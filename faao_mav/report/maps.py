@@ -42,7 +42,7 @@ def route_map(
     """
     plan = solution.plan
     stations = [station.at(solution.t) for station in plan.radio.stations]
-    frame = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+    frame = plan.origin.frame
     fence = plan.geofence if conversion is None else conversion.mission.fence
     outlines = _draw_fence(plot, fence, frame)
     if plan.keep_in is not None and plan.fence is not None:

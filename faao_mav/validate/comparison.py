@@ -12,7 +12,6 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.model import in_ground
@@ -124,8 +123,7 @@ def predicted_line(solution: Solution, track: Track | None) -> Line:
     """
     if track is None:
         return Line.planned(solution)
-    origin = solution.plan.origin
-    w, up = np.split(track.within(LocalFrame(origin.latitude, origin.longitude)), [2], axis=1)
+    w, up = np.split(track.within(solution.plan.origin.frame), [2], axis=1)
     line = Line(track.t, w, up[:, 0])
     off, start = departure(solution, Line.planned(solution), line)
     if not math.isfinite(off):

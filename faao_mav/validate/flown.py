@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faao_mav.arrays import Real
-from faao_mav.geodesy import LocalFrame
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, positions_at, price_flight
 from faao_mav.schedule.route import set_out
@@ -122,8 +121,7 @@ class FlightRecord:
 
         That is: above home as it was at `start`.
         """
-        origin = solution.plan.origin
-        frame = LocalFrame(origin.latitude, origin.longitude)
+        frame = solution.plan.origin.frame
         home = self.home[max(0, int(np.searchsorted(self.t, start, "right")) - 1)]
         w = np.asarray(frame.to_local(self.latitude, self.longitude))
         return Line(self.t - start, w, self.altitude - home)
