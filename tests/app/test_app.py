@@ -113,7 +113,7 @@ def server(folder: Path, *options: object, end: int = signal.SIGTERM) -> Iterato
         yield found[0]
     finally:
         os.killpg(process.pid, end)
-        _, said = process.communicate(timeout=15)
+        _, said = process.communicate(timeout=PATIENCE)
     assert said in ("faao-mission: ended\n", "")  # "": where Ctrl-C is ignored by the parent
     assert not ran.exists()
 

@@ -47,11 +47,11 @@ def peer_of(kind: str) -> Peer:
     return Peer(GROUND_STATION, VEHICLE, vehicle_of(kind))
 
 
-def hurry(monkeypatch: pytest.MonkeyPatch, silence: float = 0.3) -> None:
-    """Have transfers given up soon."""
+def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have transfers given up soon; on a busy machine a mock may need a second to answer."""
     for name, value in (
-        ("machine.SILENCE", silence),
-        ("transfer.SILENCE", silence),
+        ("machine.SILENCE", 2.0),
+        ("transfer.SILENCE", 2.0),
         ("transfer.ATTEMPTS", 1),
         ("jobs.ATTEMPTS", 1),
     ):

@@ -119,7 +119,7 @@ def test_a_signed_session(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> No
     with vehicle("px4", key=KEY) as (connection, _):
         for _ in range(2):  # the second is after what is remembered of the first
             assert upload(a_mission(5), connection, system=1, signing_key=key_file).verified
-        hurry(monkeypatch, 0.5)
+        hurry(monkeypatch)
         report = upload(a_mission(5), connection, system=1)
         assert not report.verified
         assert "signs its packets" in report.problems[-1]
@@ -151,7 +151,7 @@ def test_a_recorded_session_is_not_taken_for_a_vehicle(
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: Air(played, listens=False))
     if not remembered:
         key_file.with_name("key.last").unlink()
-    hurry(monkeypatch, 0.5)
+    hurry(monkeypatch)
     told = "no vehicle: packets come .* of a recording" if remembered else "a recording of it"
     with pytest.raises(LinkError, match=told):
         upload(a_mission(5), to, system=1, signing_key=key_file, wait=1.0)
