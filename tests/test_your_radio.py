@@ -219,14 +219,19 @@ def test_what_is_wrong_in_a_file_or_with_it_is_told_in_one_line(tmp_path: Path) 
 STAIRS: tuple[dict[str, Any], ...] = (
     {"radio.fading": "ergodic"},
     {"radio.fading": "realization", "radio.relay.antennas": 1},
-    {"radio.causal": True},
     {"radio.causal": True, "radio.duplex": "half", "flight.altitude": 80},
-    {"radio.gain.elevation_db": [18, -30, 10]},
+    {"radio.gain.elevation_db": [18, -30, 10], "radio.causal": True},
     {"vehicle.max_speed": 8, "radio.gain.exponent": 2.2, "radio.reference_gain_db": -46},
 )
-FAINT = {"radio.base_station.power_dbm": -5, "radio.relay.power_dbm": -3, "flight.duration": 30}
+FAINT = {
+    "radio.base_station.power_dbm": -5,
+    "radio.relay.power_dbm": -3,
+    "flight.duration": 30,
+    "optimizer.starts": ["straight", "bs-user"],
+}
 
 
+@pytest.mark.usefixtures("coarse_map")
 @pytest.mark.parametrize("changes", STAIRS)
 def test_what_is_priced_is_what_was_maximised(tmp_path: Path, changes: dict[str, Any]) -> None:
     """Steps along the flight, and the same that rise over half a decibel; no bound is below."""
