@@ -162,7 +162,7 @@ def beside(solution: Solution, flight: Prediction) -> Iterator[str]:
     bandwidth = plan.radio.bandwidth_mhz
     delivers = _of_plan(flight.delivered_rate, solution.delivered_rate, bandwidth)
     delivers += _megabytes(plan.megabytes(flight.delivered_rate))
-    late = round(flight.duration - plan.flight.duration, 1) + 0.0  # no minus before 0.0
+    late = flight.duration - plan.flight.duration
     yield f"delivers {delivers}, in {flight.duration:.1f} s ({late:+z.1f} s)"
     yield f"base station to UAV {_of_plan(rates.R_U, planned.R_U, bandwidth)}"
     yield f"UAV to user {_of_plan(rates.R_G, planned.R_G, bandwidth)}"
