@@ -22,10 +22,8 @@ from faao_mav.workflow import Result, plan_mission
 BAND = {"radio.fading": "none", "radio.bandwidth_mhz": 20}
 KINDS: list[dict[str, Any]] = [
     {},
-    {"radio.causal": True},
     {"radio.causal": True, "radio.duplex": "half"},
     {"radio.causal": True, "radio.relay.buffer_mbytes": 30},
-    {"radio.duplex": "half"},
 ]
 
 

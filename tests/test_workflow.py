@@ -4,9 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import SMALL, MakePlan, edited
+from conftest import MakePlan
 
-from faao_mav import Vehicle, check, parse_plan, plan_mission, read_mission, read_parameters
+from faao_mav import plan_mission, read_mission, read_parameters
 from faao_mav.autopilot import ARDUCOPTER
 from faao_mav.errors import FaaoError, InfeasibleError, InputError
 from faao_mav.optimizer.pricing import MutualInformation
@@ -54,10 +54,9 @@ def test_files_come_together_and_go_when_they_are_no_longer_the_missions(
     assert read_mission(mission).items == result.conversion.mission.items
     assert read_parameters(beside) == result.conversion.parameters
     assert result.write(mission) == written == mission_files(mission, result.solution.plan)
-    for changes in ({"mission.parameters": "keep"}, {"vehicle.autopilot": "px4"}):
-        anew = plan_mission(small_plan(QUICK | changes))
-        assert {path.name for path in anew.write(out)} == names()
-        result.write(out)
+    other = plan_mission(small_plan(QUICK | {"vehicle.autopilot": "px4"}))
+    assert {path.name for path in other.write(out)} == names() == {"m.waypoints", "m.params"}
+    result.write(out)
 
     fence = fenced.solution.plan.geofence
     assert [path.name for path in fenced.write(out)][2:] == ["m.fence.waypoints"]
@@ -75,17 +74,6 @@ def test_files_come_together_and_go_when_they_are_no_longer_the_missions(
         with pytest.raises(InputError, match="not of an earlier run"):
             fenced.write(out)
         assert own.read_text() == text
-
-
-def test_what_is_written_is_in_time(tmp_path: Path) -> None:
-    lively = {"vehicle.max_speed": 8, "flight.end": [120, 0], "flight.duration": 40}
-    result = plan_mission(parse_plan(edited(SMALL, QUICK | lively)))
-    out, beside = result.write(tmp_path / "m.plan")
-    mission, loaded = read_mission(out), Vehicle(parameters=read_parameters(beside))
-    checked = check(mission, loaded, solution=result.solution)
-    assert [finding.rule for finding in checked.findings if finding.level != "note"] == []
-    without = check(mission, Vehicle(), solution=result.solution)
-    assert "link-late" in {finding.rule for finding in without.findings}
 
 
 def test_how_near_the_fence_the_flight_comes(fenced: Result, small_plan: MakePlan) -> None:

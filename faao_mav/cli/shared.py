@@ -40,7 +40,6 @@ File: TypeAlias = Path | None
 
 SYSTEM = option("N", "The vehicle's system number.", min=1, max=255)
 ALLOW_ARMED = flag("--allow-armed", "Replace the mission of an armed vehicle too.")
-RADIO = option("udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines.")
 SIGNING_KEY = option("F", "File with the key for signed packets: 32 bytes, or in hex.")
 AUTOPILOT = option("NAME", "Whose mission it is: ardupilot or px4.", "--autopilot")
 PLAN_FILE = option(

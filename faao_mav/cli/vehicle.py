@@ -153,7 +153,9 @@ def fly(
     untimed: bool = cli.flag(
         "--untimed", "Arm it with other parameters than MISSION is timed for."
     ),
-    radio: str | None = cli.RADIO,
+    radio: str | None = cli.option(
+        "udp:HOST:PORT", "Tell radios the precoders of each slot, in JSON lines."
+    ),
     as_json: bool = cli.flag("--json", "Print JSON objects, one a line."),
     *,
     link: dict[str, Any],
@@ -246,7 +248,6 @@ def debrief(
     solution_file: cli.File = cli.SOLUTION_FILE,
     system: int | None = cli.SYSTEM,
     report: cli.File = cli.option("PAGE.html", "One page with all three tracks."),
-    radio: str | None = cli.RADIO,
     as_json: bool = cli.AS_JSON,
 ) -> None:
     """Say what became of a plan, from the log of its flight.
@@ -255,7 +256,6 @@ def debrief(
     station (.tlog), and tells how late it was, how far from plan and path, and what each hop
     carried along the real track with the planned precoders, beside what was planned and predicted.
     Of several vehicles in a .tlog it is the one whose flight is the plan's, or that of --system.
-    --radio replays the flight to radios, at the pace at which it was flown.
 
     Exit status: 0 told; 1 the plan's flight is not in the log; 2 unusable arguments or input.
     """
@@ -263,7 +263,6 @@ def debrief(
         raise InputError("--plan or --solution: give the plan that was flown")
     inputs = {"LOG": log, "--plan": plan_file, "--solution": solution_file}
     cli.check_outputs({"--report": report}, inputs)
-    from faao_mav.fly.fly import Radios
     from faao_mav.fly.logs import read_log
     from faao_mav.report.debrief import FromLog
     from faao_mav.report.summary import joined
@@ -272,7 +271,6 @@ def debrief(
     records = read_log(log, system)  # what is no log is refused before the plan is solved
     solution = cli.planned(plan_file, solution_file)
     assert solution is not None
-    radios = None if radio is None else Radios(solution, radio)
     told = FromLog.of(records, with_mission(Result(solution)), str(log))
     if report is not None:
         from faao_mav.report.page import render_report
@@ -280,6 +278,3 @@ def debrief(
         page = render_report(told, title=log.name)
         write_whole(report, page.encode())
     cli.show(told.as_dict, lambda: [joined(told.lines())], as_json=as_json)
-    if radios is not None:
-        count = radios.replay(told.record.line(solution, told.found.start))
-        cli.note(f"{count} slots were told to {radio}")

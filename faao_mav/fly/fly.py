@@ -21,7 +21,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.precoder_table import check_of_slots, taken_by
 from faao_mav.validate import flown
 from faao_mav.validate.comparison import predicted_line
-from faao_mav.validate.flown import Debriefing, FlightRecord, Line
+from faao_mav.validate.flown import Debriefing, FlightRecord
 from faao_mav.validate.rule import Finding, Level, by_rule, count_of, line_of
 from faao_mav.vector import lengths
 from faao_mav.wire.client import LinkOptions, Session
@@ -167,26 +167,12 @@ class Radios:
         }
         return json.dumps(told)
 
-    def tell(self, t: float | None, w: Real) -> bool:
-        """Send the line of that slot, if it is another one; tell whether it is."""
+    def tell(self, t: float | None, w: Real) -> None:
+        """Send the line of that slot, if it is another one."""
         line = self.line(t, w)
         if line is not None:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link, suppress(OSError):
                 link.sendto(f"{line}\n".encode(), self._to)
-        return line is not None
-
-    def replay(self, flight: Line) -> int:
-        """Tell the slots of a `flight` on the plan's clock at the pace at which it was flown.
-
-        Return how many there were.
-        """
-        begin, count = time.monotonic(), 0
-        during = (flight.t >= 0) & (flight.t < self._solution.plan.flight.duration)
-        times = flight.t[during].tolist()
-        for t, w in zip(times, flight.w[during], strict=True):
-            time.sleep(max(0.0, begin + t - times[0] - time.monotonic()))
-            count += self.tell(t, w)
-        return count
 
 
 def _pairs(P: Complex) -> list[list[list[float]]]:

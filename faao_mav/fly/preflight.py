@@ -16,7 +16,7 @@ from faao_mav.autopilot.manners import FenceAction
 from faao_mav.errors import InputError, counted
 from faao_mav.fly.telemetry import Ending, Held, Telemetry, read_held
 from faao_mav.mission.item import Home, Mission
-from faao_mav.validate import Check, Limits, check, predicted
+from faao_mav.validate import Check, Limits, check
 from faao_mav.validate.rule import Finding, Level, Rule, rows_of
 from faao_mav.validate.speeds import beyond_lean
 from faao_mav.wire import whereabouts
@@ -134,19 +134,21 @@ class Clearance:
             *_state(flight, seen),
             *_place(flight, held, seen),
             *_lists(flight, held, seen, judged.vehicle),
-            *_timing(flight, held, seen, judged),
+            *_timing(flight, held, seen),
             *_battery(seen, judged),
             *(each for each in judged.findings if each.level is not Level.NOTE),
             *_by_itself(flight, held, seen, judged.vehicle),
         ]
-        allowed = {"place-": "--elsewhere"} if self.elsewhere else {}
-        allowed |= {"timing-": "--untimed"} if self.untimed else {}
-        for rules, option in allowed.items():
-            for k, each in enumerate(found):
-                if each.level is Level.ERROR and each.rule.startswith(rules):
-                    action = f"{option}: flown all the same"
-                    found[k] = replace(each, level=Level.WARNING, action=action)
-        return tuple(sorted(found, key=lambda each: [*Level].index(each.level)))
+        ordered = sorted(map(self._overruled, found), key=lambda each: [*Level].index(each.level))
+        return tuple(ordered)
+
+    def _overruled(self, found: Finding) -> Finding:
+        """Return what was found, as a warning where an option allows it."""
+        options = {"place": (self.elsewhere, "elsewhere"), "timing": (self.untimed, "untimed")}
+        allowed, option = options.get(found.rule.partition("-")[0], (False, ""))
+        if not allowed or found.level is not Level.ERROR:
+            return found
+        return replace(found, level=Level.WARNING, action=f"--{option}: flown all the same")
 
     @property
     def is_clear(self) -> bool:
@@ -263,7 +265,7 @@ def _lists(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterato
             yield _found("holds-more", level, rule, title=title, items=items, idle=idle)
 
 
-def _timing(flight: Flight, held: Held, seen: Telemetry, judged: Check) -> Iterator[Finding]:
+def _timing(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
     """Yield where its parameters are not those that the mission is timed for."""
     given, values = flight.vehicle.parameters, held.reading.values
     other, unread, assumed = list[str](), list[str](), list[str]()
@@ -278,24 +280,12 @@ def _timing(flight: Flight, held: Held, seen: Telemetry, judged: Check) -> Itera
                 other.append(f"{name} is {values[name]:g}, not {wanted:g}")
     # Setpoints come when they are due, whatever the mission's time is.
     level = Level.WARNING if flight.streamed else None
-    if other:
-        late = _lateness(flight, judged)
-        yield _found("timing-other", level, names=", ".join(other), late=late)
-    if unread:
-        yield _found("timing-unread", level, names=", ".join(unread))
-    if assumed:
-        yield _found("parameters-unread", names=", ".join(assumed))
+    rows = ("timing-other", level, other), ("timing-unread", level, unread)
+    for row, its_level, names in (*rows, ("parameters-unread", None, assumed)):
+        if names:
+            yield _found(row, its_level, names=", ".join(names))
     if not given:
         yield _found("timing-unknown")
-
-
-def _lateness(flight: Flight, judged: Check) -> str:
-    """Return how long the flight takes with the parameters of both, as the end of a sentence."""
-    own = replace(judged.vehicle, parameters=flight.vehicle.parameters).usable()
-    meant, _ = predicted(judged.mission, own, judged.wind)
-    if judged.track is None or meant is None:
-        return ""
-    return f"; predicted to take {judged.track.t[-1]:.1f} s, not {meant.t[-1]:.1f} s"
 
 
 def _battery(seen: Telemetry, judged: Check) -> Iterator[Finding]:

@@ -205,7 +205,8 @@ class Stream(Watch):
     @property
     def _without_setpoints(self) -> float:
         """For how many of the world's seconds it keeps its mode without setpoints."""
-        kept = {**self._rules.defaults, **self.gate.held.reading.values}[self._rules.timeout]
+        name, values = self._rules.timeout, self.gate.held.reading.values
+        kept = values.get(name, self._rules.defaults[name])
         return kept / max(self._clock.speed, 1.0)
 
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:

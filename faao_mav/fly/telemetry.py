@@ -260,11 +260,11 @@ class Telemetry:
                 if self._rows and not (same and message.total in (0, self.items)):
                     self._end("changed", "the vehicle's mission is another one now than the file's")
             case messages.MissionItemInt(mission_type=MissionType.MISSION, seq=seq, item=item):
-                rows = (*self._rows[:seq], item, *self._rows[seq + 1 :])
-                held = self._home <= seq < len(self._rows)
-                found = compare(self._rows, rows, MissionType.MISSION, self.vehicle) if held else ()
-                for wrong in (each for each in found if each.kind == "wrong"):
-                    self._end("changed", f"the vehicle's mission is another one now: {wrong}")
+                if self._home <= seq < len(self._rows) and item != self._rows[seq]:
+                    rows = (*self._rows[:seq], item, *self._rows[seq + 1 :])
+                    found = compare(self._rows, rows, MissionType.MISSION, self.vehicle)
+                    for wrong in (each for each in found if each.kind == "wrong"):
+                        self._end("changed", f"the vehicle's mission is another one now: {wrong}")
             case messages.Statustext(severity=severity, text=text) if severity <= _WARNING:
                 self.said.append(text.strip())
                 self.told.append(f"the vehicle says: {text.strip()}")

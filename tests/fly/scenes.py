@@ -1,7 +1,10 @@
-"""A mock autopilot and a watch of it, on a simulated link."""
+"""A mock autopilot and a watch of it on a simulated link, as a row of words sets it up.
+
+`test_scenes.py` says what the words are.
+"""
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -10,10 +13,19 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from conftest import FLYABLE, edited
 from simulate import Station, simulate
-from stations import FOREIGN, HOME, VEHICLE, Counted, a_mission, peer_of, vehicle_of
+from stations import (
+    FOREIGN,
+    HOME,
+    RALLY,
+    VEHICLE,
+    Counted,
+    a_mission,
+    peer_of,
+    rows_for,
+    vehicle_of,
+)
 
 from faao_mav import optimize, parse_plan
-from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.fly.itinerary import LEVEL, NEAR
 from faao_mav.fly.preflight import Clearance, Flight
@@ -21,7 +33,7 @@ from faao_mav.fly.stream import Stream
 from faao_mav.fly.telemetry import Held
 from faao_mav.fly.watch import Watch
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission import Home, Mission
+from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
@@ -30,7 +42,7 @@ from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import CommandLong, Envelope, Heartbeat, Message
 from faao_mav.wire.parameters import Reading
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MissionType
+from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
 
 METRE = 1e7 / 111_319.5
@@ -38,6 +50,8 @@ METRE = 1e7 / 111_319.5
 
 LOITER = 5
 """A pilot's mode, of ArduCopter: PX4 knows no such number, and the mock takes any."""
+
+# ---- what is flown
 
 ZONE = {
     "margin": 3,
@@ -82,6 +96,12 @@ PLANS: dict[str, dict[str, Any]] = {
 from where the vehicle stands; a swift one, which flies 8 m/s for most of 206 m, with a zone across
 its straight or without; and one that waits in the middle."""
 
+FAR = MissionItem(16, 3, x=HOME.latitude + 0.01, y=HOME.longitude, z=30.0)
+MISSIONS = {
+    "far": Mission((a_mission(3).items[0], FAR, MissionItem(20, 2)), HOME),
+    "hovering": Mission(a_mission(12).items[:-1], HOME),
+}
+
 
 @cache
 def planned(flight: str) -> Solution:
@@ -105,168 +125,44 @@ def fly(mission: Mission, _: Vehicle | None = None) -> Track:
     """Return a flight from home over all places at 10 m/s; landing where it started."""
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)
-    points, items = [np.zeros(3)], [0]
+    corners = [(np.zeros(3), 0)]
     for index, item in enumerate(mission.items):
         if item.command in (20, 21):
-            points += [points[0] + [0, 0, points[-1][2]], points[0]]
-            items += [index, index]
-        elif item.frame == 3 or item.frame == 6:
-            points.append(np.append(frame.to_local(item.x, item.y), item.z))
-            items.append(index)
-    legs = [np.linalg.norm(b - a) / 10.0 for a, b in pairwise(points)]
-    times = np.concatenate([[0.0], np.cumsum(legs)])
+            high = corners[-1][0] * [0, 0, 1]
+            corners += [(high, index), (np.zeros(3), index)]
+        else:
+            corners.append((np.append(frame.to_local(item.x, item.y), item.z), index))
+    points, items = (np.array(column) for column in zip(*corners, strict=True))
+    times = np.cumsum([0.0, *(np.linalg.norm(b - a) / 10.0 for a, b in pairwise(points))])
     t = np.linspace(0.0, times[-1], int(times[-1] * 10) + 2)
-    position = np.column_stack([np.interp(t, times, np.array(points)[:, k]) for k in range(3)])
-    velocity = np.gradient(position, t, axis=0)
-    following = np.searchsorted(times[1:], t, side="left").clip(max=len(legs) - 1)
+    position = np.column_stack([np.interp(t, times, points[:, k]) for k in range(3)])
+    following = np.searchsorted(times[1:], t, side="left").clip(max=len(times) - 2)
     reached = np.full(len(mission.items), math.nan)
-    for index, time in zip(items[1:], times[1:], strict=True):
-        reached[index] = time
-    return Track(t, position, velocity, np.array(items[1:])[following], reached, frame)
+    reached[items[1:]] = times[1:]  # of two corners the second
+    return Track(
+        t, position, np.gradient(position, t, axis=0), items[1:][following], reached, frame
+    )
 
 
-def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
-    """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
-    values = mock.parameters.values.items()
-    told = {name: value for name, value in values if name not in untold}
-    lists = {part: mock.lists.items(part) for part in MissionType}
-    return Held(lists, Reading(told), home=mock.home)
+# ---- the scene
 
+MODES: dict[str, dict[str, int]] = {
+    "ardupilot": {"mission": 3, "guided": 4, "loiter": 5, "return": 6, "land": 9, "hold": 17},
+    "px4": {
+        "loiter": 5,
+        "guided": 6 << 16,
+        **{name: 4 << 16 | n << 24 for n, name in ((3, "hold"), (4, "mission"), (5, "return"))},
+        "land": 4 << 16 | 6 << 24,
+    },
+}
+ORDERS: dict[str, tuple[int, float]] = {
+    "arm": (MavCommand.ARM, 1.0),
+    "disarm": (MavCommand.ARM, 0.0),
+    "start": (MavCommand.START, 0.0),
+}
 
-Heard: TypeAlias = Callable[[Any, float], object]
+Picks: TypeAlias = Callable[[Message], bool]
 Lens: TypeAlias = Callable[[Message, float], Sequence[Message]]
-
-
-class Scene:
-    """A mock autopilot that holds a mission, and a watch of it on a simulated link.
-
-    `flight` is what is asked for beside that mission, for which the mock may not be ready. With a
-    `solution` it is flown by setpoints: `times`, s, are when the flying mock was sent one, `sent`
-    where to and `places` where it was, m. `events` happen at their times, with `others` on the
-    link, which has `faults`.
-    """
-
-    def __init__(
-        self,
-        kind: str,
-        mission: Mission | None = None,
-        *,
-        arm: bool = False,
-        lands: bool = True,
-        solution: Solution | None = None,
-        flight: Flight | None = None,
-        elsewhere: bool = False,
-        untimed: bool = False,
-        **options: Any,
-    ) -> None:
-        mission = mission or a_mission(12)
-        if solution is not None:
-            options["parameters"] = {"GUID_TIMEOUT": 1.0, **options.get("parameters", {})}
-        behaviour = behaviour_of(cast(MockKind, kind))
-        self.mock: Any = MockAutopilot(behaviour, **{"home": HOME, **options})
-        self.mock.flight._fly = fly
-        for part in MissionType:
-            self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
-        flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
-        gate = Clearance(flight, peer_of(kind), held_by(self.mock), elsewhere, untimed)
-        self.watch: Any = Stream(gate) if solution else Watch(gate, arm=arm, lands=lands)
-        self.client, self.solution = Counted(self.watch), solution
-        self.times, self.sent, self.places = list[float](), list[Real](), list[Real]()
-        self.events, self.others = list[tuple[float, Any]](), list[Station]()
-        self.faults, self.until = Faults(), 300.0
-        self._record()
-
-    def _record(self) -> None:
-        hear = self.mock.flight.hear
-
-        def heard(message: messages.SetPositionTargetLocalNed, now: float) -> bool:
-            flight = self.mock.flight
-            if flight.armed:
-                self.times.append(now)
-                self.sent.append(flight.aim(message)[0])
-                self.places.append(flight.aircraft.at(now).position)
-            return bool(hear(message, now))
-
-        self.mock.flight.hear = heard
-
-    def assert_gated(self, lag: float = 0.0) -> None:
-        """Check that it was never sent farther than the gate lets it, and within its fence.
-
-        `lag` is how far it flies, m, while a position and its answer are on the link.
-        """
-        assert self.solution is not None
-        off, area = np.array(self.sent) - np.array(self.places), self.solution.plan.keep_in
-        across = np.hypot(*off[:, :2].T)
-        assert across.max() <= CAP + lag
-        assert np.abs(off[:, 2]).max() <= LEVEL + 2.0 + lag
-        for place, to, far in zip(self.places, self.sent, across, strict=True):
-            if area is not None and far > NEAR + lag:
-                assert area.covers_path(np.array([place[:2], to[:2]]))
-
-    def after(self, begin: float, end: float = float("inf")) -> int:
-        """Return how many setpoints it was sent after `begin`, s, and before `end`."""
-        return sum(begin < each < end for each in self.times)
-
-    def run(self, looks: Sequence[tuple[float, Callable[[float], object]]] = ()) -> str:
-        """Return the kind of the ending, "-" for none; `looks` are called at their times."""
-        stations, events = (
-            (Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)),
-            [*self.events, *looks],
-        )
-        simulate(*stations, self.faults, self.until, events=events, others=self.others)
-        return self.watch.outcome.kind if self.watch.outcome is not None else "-"
-
-    @property
-    def orders(self) -> list[Message]:
-        """What was sent that moves the vehicle: everything but requests for telemetry."""
-        return [each for each in self.client.sent if not harmless(each)]
-
-    def does(self, number: int, *params: float) -> Any:
-        """Return an event: somebody else gives a command."""
-        message = CommandLong(VEHICLE, number, 0, *map(float, params))
-        return lambda now: self.mock.on(Envelope(FOREIGN, message), now)
-
-    def sets(self, mode: int) -> Any:
-        """Return an event: the pilot sets a mode."""
-        return lambda now: self.mock.on(Envelope(FOREIGN, messages.SetMode(1, 1, mode)), now)
-
-    def tells(self, lens: Lens) -> None:
-        """Let the vehicle send what `lens` makes of each of its messages, and the time."""
-        tick, on = self.mock.tick, self.mock.on
-
-        def through(messages: Sequence[Message], now: float) -> list[Message]:
-            return [told for message in messages for told in lens(message, now)]
-
-        self.mock.tick = lambda now: through(tick(now), now)
-        self.mock.on = lambda envelope, now: through(on(envelope, now), now)
-
-    def loses(self, when: Heard, *, heard: bool = False) -> None:
-        """Let what is sent to the vehicle be lost; or, where it is `heard`, its answers."""
-        on = self.mock.on
-
-        def hear(envelope: Envelope, now: float) -> Sequence[Message]:
-            lost = when(envelope.message, now)
-            answers = on(envelope, now) if heard or not lost else ()
-            return () if lost else cast(Sequence[Message], answers)
-
-        self.mock.on = hear
-
-    def interrupt(self, now: float) -> None:
-        """Press Ctrl-C; what is sent then is lost at first."""
-        self.client.sent += self.client.cancel(now)
-
-    def hang_up(self, now: float) -> None:
-        """Close the terminal; what is sent then is lost at first."""
-        self.client.hang_up(now)
-
-    @property
-    def commands(self) -> list[tuple[int, float]]:
-        """The commands that were given, with their first parameters."""
-        orders = (each for each in self.orders if isinstance(each, CommandLong))
-        return [(each.command, each.param1) for each in orders]
-
-    def told(self, words: str) -> bool:
-        return any(words in text for text in self.watch.seen.told)
 
 
 def is_setpoint(message: object) -> bool:
@@ -285,6 +181,7 @@ def starts(message: object) -> bool:
 
 
 def harmless(message: Message) -> bool:
+    """Tell whether a message only asks for something."""
     asked = (MavCommand.SET_INTERVAL, MavCommand.REQUEST_MESSAGE)
     asks = isinstance(message, CommandLong) and message.command in asked
     reads = (
@@ -295,6 +192,237 @@ def harmless(message: Message) -> bool:
         | messages.Timesync
     )
     return asks or isinstance(message, reads)
+
+
+PICKED: dict[str, Picks] = {
+    "arm": lambda message: arms(message, 1.0),
+    "disarm": lambda message: arms(message, 0.0),
+    "start": starts,
+    "setpoints": is_setpoint,
+    "hold": lambda message: (
+        isinstance(message, CommandLong)
+        and message.command == MavCommand.SET_MODE
+        and (message.param2, message.param3) in ((MODES["ardupilot"]["hold"], 0), (4, 3))
+    ),
+    "land": lambda message: getattr(message, "param2", None) == MODES["ardupilot"]["land"],
+}
+
+
+def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
+    """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
+    values = mock.parameters.values.items()
+    told = {name: value for name, value in values if name not in untold}
+    lists = {part: mock.lists.items(part) for part in MissionType}
+    return Held(lists, Reading(told), home=mock.home)
+
+
+class Scene:
+    """A mock autopilot that holds a mission, and a watch of it on a simulated link.
+
+    `flight` is what is asked for beside that mission, for which the mock may not be ready; with a
+    `solution` that is flown by setpoints. `events` happen at their times, s, with `others` on the
+    link, which has `faults`. What is sent is judged by `client`.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        mission: Mission | None = None,
+        *,
+        arm: bool = False,
+        lands: bool = True,
+        solution: Solution | None = None,
+        flight: Flight | None = None,
+        elsewhere: bool = False,
+        **options: Any,
+    ) -> None:
+        mission = mission or a_mission(12)
+        if solution is not None:
+            options["parameters"] = {"GUID_TIMEOUT": 1.0, **options.get("parameters", {})}
+        behaviour = behaviour_of(cast(MockKind, kind))
+        self.home = options.setdefault("home", HOME)
+        self.mock: Any = MockAutopilot(behaviour, **options)
+        self.mock.flight._fly = fly
+        for part in MissionType:
+            self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
+        flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
+        gate = Clearance(flight, peer_of(kind), held_by(self.mock), elsewhere)
+        self.watch: Any = Stream(gate) if solution else Watch(gate, arm=arm, lands=lands)
+        self.kind, self.solution, self.faults, self.until = kind, solution, Faults(), 300.0
+        self.events, self.others = list[tuple[float, Any]](), list[Station]()
+        self.client = Judge(self)
+
+    def run(self, looks: Sequence[tuple[float, Callable[[float], object]]] = ()) -> str:
+        """Return the kind of the ending, "-" for none; `looks` are called at their times."""
+        stations = Station(self.client, GROUND_STATION), Station(self.mock, VEHICLE)
+        events = [*self.events, *looks]
+        simulate(*stations, self.faults, self.until, events=events, others=self.others)
+        return self.watch.outcome.kind if self.watch.outcome is not None else "-"
+
+    @property
+    def orders(self) -> list[Message]:
+        """What was sent that moves the vehicle: everything but requests for telemetry."""
+        return [each for each in self.client.sent if not harmless(each)]
+
+    @property
+    def commands(self) -> list[tuple[int, float]]:
+        """The commands that were given, with their first parameters."""
+        orders = (each for each in self.orders if isinstance(each, CommandLong))
+        return [(each.command, each.param1) for each in orders]
+
+    def after(self, begin: float, end: float = math.inf) -> int:
+        """Return how many setpoints were sent after `begin`, s, and before `end`."""
+        return sum(begin < t < end for t, _ in self.client.setpoints)
+
+    # ---- what happens to it
+
+    def tells(self, lens: Lens) -> None:
+        """Let the vehicle send what `lens` makes of each of its messages, and the time."""
+        tick, on = self.mock.tick, self.mock.on
+
+        def through(messages: Sequence[Message], now: float) -> list[Message]:
+            return [told for message in messages for told in lens(message, now)]
+
+        self.mock.tick = lambda now: through(tick(now), now)
+        self.mock.on = lambda envelope, now: through(on(envelope, now), now)
+
+    def loses(
+        self,
+        picked: Picks,
+        begin: float = 0.0,
+        end: float = math.inf,
+        *,
+        heard: bool = False,
+        denied: int | None = None,
+    ) -> None:
+        """Let some messages to the vehicle be lost; or, where it is `heard`, the answers to them.
+
+        A command that is `denied` is answered so.
+        """
+        on = self.mock.on
+        denial = () if denied is None else (messages.CommandAck(GROUND_STATION, denied, 4),)
+
+        def hear(envelope: Envelope, now: float) -> Sequence[Message]:
+            lost = picked(envelope.message) and begin <= now < end
+            answers: Sequence[Message] = on(envelope, now) if heard or not lost else ()
+            return denial if lost else answers
+
+        self.mock.on = hear
+
+    def _event(self, word: str, number: str = "0") -> Callable[[float], object]:
+        """Return what happens at a time: it is called with that."""
+        mock, part = self.mock, MissionType.MISSION
+        rows = list(mock.lists.items(part))
+        match word:
+            case "interrupt":
+                return self.client.interrupt
+            case "hang-up":
+                return self.client.hang_up
+            case "reboot":
+                return lambda now: mock.reboot(now)
+            case "carried":
+                return lambda _: setattr(mock, "home", away(60.0))
+            case "shorten":
+                rows = rows[:-2]
+            case "change":  # an item of its mission
+                rows[5] = rows_for(self.kind, 12, shift=1e-4)[5]
+            case "rally":
+                part = MissionType.RALLY
+                mission = a_mission(5, rally=RALLY)
+                rows = list(wire_items(mission, part, vehicle_of(self.kind)))
+            case _:  # somebody else gives an order, or the pilot sets a mode
+                orders = ORDERS | {"current": (MavCommand.SET_CURRENT, float(number))}
+                message: Message
+                if word in orders:
+                    message = CommandLong(VEHICLE, orders[word][0], 0, orders[word][1])
+                else:
+                    message = messages.SetMode(1, 1, MODES[self.kind][word])
+                return lambda now: mock.on(Envelope(FOREIGN, message), now)
+        return lambda _: mock.lists.replace(part, rows)
+
+
+class Judge(Counted):
+    """A watch whose every message is judged as it is sent: `wrong` is what must not happen.
+
+    `setpoints` are when each was sent, s, and to what height above home, m.
+    """
+
+    def __init__(self, scene: Scene, *, may_start: bool = True) -> None:
+        super().__init__(scene.watch)
+        self.scene, self.may_start = scene, may_start
+        self.wrong, self.setpoints = list[str](), list[tuple[float, float]]()
+        self._told: messages.GlobalPositionInt | None = None
+        self._mode: int | None = None
+        self._ordered, self._ordered_at, self._pilots = False, 0.0, False
+
+    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
+        if envelope.sender == VEHICLE:
+            self._hear(envelope.message)
+        return self._judged(super().on(envelope, now), now)
+
+    def tick(self, now: float) -> Sequence[Message]:
+        sent = self._judged(super().tick(now), now)
+        watch = self.machine
+        asks = watch.phase == "holding" and watch._order is not None and watch.outcome is None
+        unsure = watch.streams and watch._unsure_since is not None
+        if asks and not unsure and now > self._ordered_at + 2.1:
+            self.wrong.append(f"{now:.1f} s: the hold is not asked for any more")
+        return sent
+
+    def interrupt(self, now: float) -> None:
+        """Press Ctrl-C; what is sent then is lost at first."""
+        if self.machine.outcome is None:
+            self._ordered_at = now
+            self._note(self.machine.cancel(now))
+
+    def hang_up(self, now: float) -> Sequence[Message]:
+        """Close the terminal; what is sent then is lost at first."""
+        self._ordered_at = now
+        return super().hang_up(now)
+
+    def _hear(self, message: Message) -> None:
+        match message:
+            case messages.GlobalPositionInt(time_boot_ms=t):
+                if self._told is None or t > self._told.time_boot_ms:
+                    self._told = message
+            case Heartbeat(custom_mode=mode):
+                took = mode == LOITER and self._mode != LOITER
+                self._pilots |= self._ordered and took
+                self._mode = mode
+
+    def _judged(self, sent: Sequence[Message], now: float) -> Sequence[Message]:
+        for message in sent:
+            if harmless(message):
+                continue
+            self._ordered, self._ordered_at = True, now
+            if arms(message, 1.0) and not self.may_start:
+                self.wrong.append(f"{now:.1f} s: armed")
+            if self._pilots:
+                self.wrong.append(f"{now:.1f} s: {type(message).__name__} to what a pilot has")
+            if isinstance(message, messages.SetPositionTargetLocalNed):
+                self._measure(message, now)
+        return sent
+
+    def _measure(self, setpoint: messages.SetPositionTargetLocalNed, now: float) -> None:
+        """Compare where it is sent with where it said that it is, which is behind by a `lead`."""
+        told, faults, home = self._told, self.scene.faults, self.scene.home
+        assert self.scene.solution is not None
+        assert told is not None
+        plan = self.scene.solution.plan
+        own = self.machine._family.local_frame(home.latitude, home.longitude)
+        plans = LocalFrame(plan.origin.latitude, plan.origin.longitude)
+        to = plans.to_local(*own.to_geodetic([setpoint.y, setpoint.x]))
+        place = plans.to_local(told.lat / 1e7, told.lon / 1e7)
+        self.setpoints.append((now, -setpoint.z))
+        up = home.altitude - setpoint.z - told.alt / 1000
+        across, speed = float(np.hypot(*(to - place))), plan.max_ground_speed
+        lead = min(2 * (faults.latency + faults.delay), 1.0) + 0.05
+        cap = NEAR + speed**2 / (2 * plan.vehicle.max_acceleration) + speed * lead
+        if across > cap or abs(up) > LEVEL + 2.0 + speed * lead:
+            self.wrong.append(f"{now:.1f} s: sent {across:.1f} m away, {up:+.1f} m up")
+        far, straight = across > NEAR + speed * lead, np.array([place, to])
+        if far and plan.keep_in is not None and not plan.keep_in.covers_path(straight):
+            self.wrong.append(f"{now:.1f} s: sent across the fence, {across:.1f} m")
 
 
 class AnotherStation(Machine[None]):
@@ -323,3 +451,113 @@ class Companion(AnotherStation):
         self._due = now + 0.3
         ms, place = round(now * 1000) + 5000, (round(HOME.latitude * 1e7), round(1e9), 9000, 9000)
         return [Heartbeat(18, 8, 0, LOITER, 4), messages.GlobalPositionInt(ms, *place, 0, 0, 0, 0)]
+
+
+# ---- a scene in words
+
+SPEAKERS = {"station": FOREIGN, "twin": GROUND_STATION, "companion": Address(1, 191)}
+FAULTS = ("loss", "seed", "reordering", "delay", "duplication", "latency")
+
+
+def positions(change: Callable[..., messages.GlobalPositionInt]) -> Callable[..., Lens]:
+    """Return what makes a lens: positions of some time are changed, by numbers beside them."""
+
+    def lens(begin: float, end: float, *numbers: float) -> Lens:
+        first: list[messages.GlobalPositionInt] = []
+
+        def told(said: Message, now: float) -> Sequence[Message]:
+            if not isinstance(said, messages.GlobalPositionInt) or not begin <= now < end:
+                return [said]
+            first.append(said)
+            return [change(said, first[0], *numbers)]
+
+        return told
+
+    return lens
+
+
+def blind(begin: float, _: float) -> Lens:
+    return lambda said, now: [said][isinstance(said, messages.GlobalPositionInt) and now > begin :]
+
+
+def hold_up(begin: float, end: float) -> Lens:
+    """Hold back all that the vehicle says, and then deliver it at once."""
+    held = list[Message]()
+
+    def bursts(said: Message, now: float) -> Sequence[Message]:
+        held.append(said)
+        out = [] if begin <= now < end else held[:]
+        del held[: len(out)]
+        return out
+
+    return bursts
+
+
+def lag(*_: float) -> Lens:
+    """Tell the item under way a message later, which is a second."""
+    told: list[Message] = []
+
+    def late(said: Message, _: float) -> Sequence[Message]:
+        if isinstance(said, messages.MissionCurrent):
+            told.append(said)
+            return told[-2:-1] or [said]
+        return [said]
+
+    return late
+
+
+LENSES: dict[str, Callable[..., Lens]] = {
+    "blind": blind,
+    "hold-up": hold_up,
+    "lag": lag,
+    "jump": positions(lambda p, _, north: replace(p, lat=p.lat + round(north * METRE))),
+    "stuck": positions(lambda p, first: replace(first, time_boot_ms=p.time_boot_ms)),
+    "leap": positions(
+        lambda p, _, by: replace(p, time_boot_ms=max(p.time_boot_ms + round(1000 * by), 0))
+    ),
+    "higher": positions(lambda p, _, by: replace(p, relative_alt=p.relative_alt - int(1000 * by))),
+}
+"""What becomes of what the vehicle says: places jump or stand, its clock leaps, home moves."""
+
+
+def staged(flies: str, kind: str, given: Mapping[str, str], happens: str = "") -> Scene:
+    """Return a scene as it is set up by its words."""
+    numbers = {k: float(v) for k, v in given.items() if v and k != "home"}
+    options: dict[str, Any] = {k: v for k, v in numbers.items() if k in ("boot", "place")}
+    options |= {"battery": int(numbers["battery"])} if "battery" in numbers else {}
+    options |= {"home": away(*map(float, given["home"].split(",")))} if "home" in given else {}
+    scene = Scene(
+        kind,
+        MISSIONS.get(flies),
+        solution=planned(flies) if flies in PLANS else None,
+        arm=flies not in (*PLANS, "watch"),
+        lands=flies != "hovering",
+        elsewhere="elsewhere" in given,
+        parameters={name: value for name, value in numbers.items() if name.isupper()},
+        **options,
+    )
+    if "stays-armed" in given:
+        scene.mock.flight.aircraft.landed = lambda _: False
+    if "refuses" in given:
+        scene.loses(starts, denied=MavCommand.START)
+    silences = list[tuple[float, float]]()
+    for when, word, *words in map(str.split, filter(None, happens.split("; "))):
+        begin, end = (float(each) for each in (when.split("-") * 2)[:2])
+        if word == "silence":
+            silences.append((begin, end))
+        elif word in ("loses", "mutes"):
+            scene.loses(PICKED[words[0]], begin, end, heard=word == "mutes")
+        elif word in LENSES:
+            scene.tells(LENSES[word](begin, end, *map(float, words)))
+        elif word == "unready":
+            scene.loses(PICKED["arm"], begin, end, denied=MavCommand.ARM)
+        elif word in SPEAKERS:
+            other = Companion if word == "companion" else AnotherStation
+            scene.others.append(Station(other(begin), SPEAKERS[word]))
+        else:
+            scene.events.append((begin, scene._event(word, *words)))
+    faults: dict[str, Any] = {k: v for k, v in numbers.items() if k in FAULTS}
+    seed = int(faults.pop("seed", 0))
+    scene.faults = Faults(**faults, seed=seed, outages=tuple(silences))
+    scene.until = numbers.get("until", 300.0)
+    return scene

@@ -2,33 +2,27 @@
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from conftest import FLYABLE, edited
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import CAP, SWIFT, ZONE, planned
+from scenes import CAP, SWIFT, planned
 
 from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
 from faao_mav.fly.itinerary import LEVEL, NEAR, Gate, Itinerary
 from faao_mav.fly.setpoints import Course, at_rest
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import Plan
 
 PLACES = st.tuples(st.floats(-60, 60), st.floats(-60, 60), st.floats(-40, 40)).map(np.array)
-
-
-def plan_with(changes: dict[str, Any]) -> Plan:
-    return parse_plan(edited(FLYABLE, SWIFT | changes))
 
 
 @given(st.lists(st.tuples(st.floats(0, 20), PLACES), min_size=1, max_size=8))
 def test_nothing_passes_that_is_farther_off_than_it_can_have_fallen_behind(
     steps: list[tuple[float, Real]],
 ) -> None:
-    gate, t, on_course = Gate(plan_with({}), print), 0.0, steps[0][0]
+    gate, t, on_course = Gate(planned("swift").plan, print), 0.0, steps[0][0]
     for wait, off in steps:
         t += wait
         across, up = float(np.hypot(*off[:2])), abs(float(off[2]))
@@ -46,7 +40,7 @@ def test_the_straight_to_a_setpoint_keeps_the_fence() -> None:
         ((78.0, 36.0), (85.0, 42.0), False),  # across its corner, 9 m
         ((80.5, 20.0), (79.0, 20.0), True),  # out of it
     ):
-        gate, here = Gate(plan_with({"fence": ZONE}), print), np.array([*place, 30.0])
+        gate, here = Gate(planned("fenced").plan, print), np.array([*place, 30.0])
         gate.passes(0.0, here, at_rest(here))
         assert gate.passes(60.0, here, at_rest(np.array([*setpoint, 30.0]))) == passes
 
@@ -132,7 +126,8 @@ def test_an_aircraft_that_does_not_follow_is_given_up() -> None:
 
 
 def test_a_course_is_what_its_pieces_add_up_to() -> None:
-    at_speed = optimize(plan_with({"flight.start_velocity": [3.0, 4.0]}))
+    plan = parse_plan(edited(FLYABLE, SWIFT | {"flight.start_velocity": [3.0, 4.0]}))
+    at_speed = optimize(plan)
     corners = [[0, 0, 0], [0, 0, 30], [40, 30, 30], [40, 31, 30]]
     for course in (Course.of(at_speed), Course.through(corners, [(2.0, 1.0), *[(8.0, 1.6)] * 2])):
         t = np.linspace(course.begin - 1, course.end + 1, 4001)

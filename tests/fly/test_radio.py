@@ -2,27 +2,21 @@
 
 import json
 import runpy
-import socket
 import threading
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from conftest import FLYABLE, edited, free_port
-from typer.testing import CliRunner
 
 from faao_mav import optimize, parse_plan
-from faao_mav.cli.main import app
 from faao_mav.errors import InputError
 from faao_mav.fly.fly import Radios
 from faao_mav.optimizer.solution import Solution
 from faao_mav.validate.flown import Line
 
-LOGS = Path(__file__).parents[1] / "data" / "logs"
 TO = "udp:127.0.0.1:5005"
 
 
@@ -100,23 +94,3 @@ def test_the_receiver_of_the_examples_receives() -> None:
     assert slot == 0
     assert np.array_equal(P_B, solution.P_B[0])
     assert np.array_equal(P_U, solution.P_U[0])
-
-
-def test_a_log_is_replayed_to_a_radio_at_its_pace(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = [100.0]
-    monkeypatch.setattr("faao_mav.workflow.with_mission", lambda result: result)
-    clock = SimpleNamespace(
-        monotonic=lambda: now[0], sleep=lambda seconds: now.__setitem__(0, now[0] + seconds)
-    )
-    monkeypatch.setattr("faao_mav.fly.fly.time", clock)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
-        radio.bind(("127.0.0.1", 0))
-        radio.settimeout(5)
-        to = f"udp:127.0.0.1:{radio.getsockname()[1]}"
-        log, plan = str(LOGS / "arducopter.tlog"), str(LOGS / "plan.yaml")
-        result = CliRunner().invoke(app, ["debrief", log, "--plan", plan, "--radio", to])
-        assert result.exit_code == 0, result.output
-        first = json.loads(radio.recv(65_536))
-        assert "slots were told to udp:" in result.output
-    assert first["slot"] == 0
-    assert now[0] - 100.0 == pytest.approx(60.0, abs=0.5)

@@ -3,8 +3,7 @@
 from typing import Any
 
 import pytest
-from scenes import Scene, arms, starts
-from stages import staged
+from scenes import Scene, arms, staged, starts
 from stations import FOREIGN, VEHICLE
 
 from faao_mav.wire.messages import (
@@ -64,7 +63,7 @@ def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
     scene = Scene("px4", arm=True)
     rows = scene.mock.lists.items(MissionType.MISSION)
 
-    def changes(message: object, _: float) -> bool:
+    def changes(message: object) -> bool:
         """Hold another mission as soon as it is armed, and say nothing to the start."""
         if starts(message):
             scene.mock.lists.replace(MissionType.MISSION, rows[:-1])
@@ -106,8 +105,8 @@ def test_what_is_answered_to_another_station_is_no_answer() -> None:
 
 def test_an_interrupt_while_it_is_read_again_ends_the_transfer() -> None:
     scene = Scene("px4", arm=True)
-    scene.events = [(5.0, scene.interrupt)]
-    scene.loses(lambda message, _: isinstance(message, MissionRequestList))
+    scene.events = [(5.0, scene.client.interrupt)]
+    scene.loses(lambda message: isinstance(message, MissionRequestList))
     assert scene.run() == "left"
     assert scene.client.sent[-1] == MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
     assert scene.orders == []
