@@ -118,8 +118,7 @@ class Ending:
 class Telemetry:
     """What is known of the vehicle of `peer`, which holds the items `rows`, home row included.
 
-    Without `rows` its mission is not looked at. It is asked for `rate` positions a second. After
-    `patience` seconds without any message, `PATIENCE` at first, nothing more can be known.
+    Without `rows` its mission is not looked at. It is asked for `rate` positions a second.
 
     `told` is what has happened and `said` what the vehicle said since the last order, a warning or
     worse, in words, `fixes` where it was; `heartbeat`, `current`, `status` and `position` are the
@@ -137,7 +136,7 @@ class Telemetry:
     def __init__(self, peer: Peer, rows: Sequence[WireItem], rate: float = POSITION_RATE) -> None:
         assert peer.vehicle is not None
         self.vehicle = peer.vehicle
-        self._peer, self._rows, self.patience = peer, tuple(rows), PATIENCE
+        self._peer, self._rows = peer, tuple(rows)
         self._home = home_items(self.vehicle, MissionType.MISSION)
         self.told: list[str] = []
         self.said: list[str] = []
@@ -269,10 +268,13 @@ class Telemetry:
                 self.said.append(text.strip())
                 self.told.append(f"the vehicle says: {text.strip()}")
 
-    def tick(self, now: float) -> list[Message]:
-        """Take note of the time, and return what to ask the vehicle."""
+    def tick(self, now: float, patience: float = PATIENCE) -> list[Message]:
+        """Take note of the time, and return what to ask the vehicle.
+
+        After `patience` seconds without any message nothing more can be known.
+        """
         quiet, out = now - self.heard_at, list[Message]()
-        if quiet >= self.patience:
+        if quiet >= patience:
             self._end("lost", f"nothing was heard for {quiet:.0f} s; the vehicle is on its own")
         elif quiet >= _SILENT and not self._is_silent:
             self._is_silent = True

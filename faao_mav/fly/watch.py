@@ -141,8 +141,7 @@ class Watch(Machine[Ending]):
             self._leave_armed("interrupted again")
         else:
             armed = "armed" if self.seen.armed else "not armed"
-            holds = self.phase != "holding" or not asked
-            doubt = "" if holds else ", and has not confirmed that it holds"
+            doubt = ", and has not confirmed that it holds" if self._is_to_hold else ""
             self._end("left", f"no longer watched: it is {armed}, {self.seen.where(now)}{doubt}")
             self._out += () if self.gate.reading is None else self.gate.reading.cancel(now)
         return self._said()
@@ -194,7 +193,7 @@ class Watch(Machine[Ending]):
                 self._on_current(message, now)
 
     def _look(self, now: float) -> None:
-        self._out += self.seen.tick(now)
+        self._out += self.seen.tick(now, math.inf if self._is_to_hold else PATIENCE)
         self._end_as_heard(now)
         if now >= self.seen.disarmed_at + _REBOOT:
             self.seen.disarmed_at = math.inf
@@ -230,12 +229,11 @@ class Watch(Machine[Ending]):
         elif self._path:
             self._path = self._path[self._path.index(mode) :]
         on_mission = self.seen.armed and mode == self._modes.mission and not self.streams
-        match self.phase:
-            case "waiting" | "starting" if on_mission:
-                self._begin()
-            case "holding" if self._path == (mode,) and self._order is not None:
-                self._order, self.seen.patience = None, PATIENCE
-                self.seen.told.append("it holds; interrupt again to leave it")
+        if on_mission and self.phase in ("waiting", "starting"):
+            self._begin()
+        elif self._is_to_hold and self._path == (mode,):
+            self._order = None
+            self.seen.told.append("it holds; interrupt again to leave it")
 
     def _on_another_mode(self, mode: int, now: float) -> None:  # noqa: ARG002
         """Step aside for who set that; the last item has a mode of its own, as PX4's return."""
@@ -278,9 +276,10 @@ class Watch(Machine[Ending]):
                 self._end("refused", f"the vehicle disarmed before the mission began{self._words}")
             case "holding":
                 self._end("held", "disarmed after it was asked to hold")
-            case "flying" if self.streams or self._furthest < self._last:
+            case "flying" if self.streams:
+                self._end("taken over", "disarmed in the middle of the flight")
+            case "flying" if self._furthest < self._last:
                 where = f"at item {self.seen.row}, before the end of the mission"
-                where = "in the middle of the flight" if self.streams else where
                 self._end("taken over", f"disarmed {where}")
             case "flying" | "ending":
                 self._end("finished", "landed and disarmed at the end of the mission")
@@ -296,7 +295,7 @@ class Watch(Machine[Ending]):
     def _step_aside(self) -> None:
         if self.phase == "disarming":
             self._leave_armed(f"the pilot or a failsafe has it, in mode {self.seen.mode}")
-        self.phase, self._order, self._path, self.seen.patience = "aside", None, (), PATIENCE
+        self.phase, self._order, self._path = "aside", None, ()
         who = "the pilot or a failsafe has the aircraft; nothing more is sent"
         self.seen.told.append(f"mode {self.seen.mode}: {who}")
 
@@ -340,9 +339,14 @@ class Watch(Machine[Ending]):
     def _ask_to_hold(self, now: float) -> None:
         hold = self._modes.hold
         self._path = self._path if self._path[-1:] == (hold,) else (*self._path, hold)
-        self._give(self._to_set(hold), now)  # the phase last: an interrupt between finds the order
-        self.phase, self.seen.patience = "holding", math.inf
+        self._give(self._to_set(hold), now)
+        self.phase = "holding"  # last: an interrupt before asks again
         self.seen.told.append("asking the vehicle to hold; interrupt again to leave it")
+
+    @property
+    def _is_to_hold(self) -> bool:
+        """Whether it was asked to hold, and is not known to do so."""
+        return self.phase == "holding" and self._order is not None
 
     def _to_set(self, mode: int) -> Order:
         return Order(MavCommand.SET_MODE, self._family.mode_parameters(mode))
@@ -406,7 +410,7 @@ class Watch(Machine[Ending]):
         elif self.phase != "disarming":
             self.outcome = ending
         elif ending is not None and ending.kind == "lost":
-            self._leave_armed(f"nothing was heard for {self.seen.patience:.0f} s")
+            self._leave_armed(f"nothing was heard for {PATIENCE:.0f} s")
 
     def _end(self, kind: Kind, text: str) -> None:
         self.outcome = self.outcome or Ending(kind, text)

@@ -5,7 +5,7 @@ A line of `tests/data/fly/gate.txt` says before the bar what the vehicle is and 
 - `stands=EAST,HIGHER`, metres from home, or `abroad`, `antipode`, `nowhere`; `returns=EAST`: its
   own home; `battery=PERCENT`, `mode=NUMBER`, `armed`, `station`, `stranger`;
 - `file` and `holds`: the mission of the file, and what the vehicle holds, if it is another one than
-  that of twelve items; `unread=LIST`; `made=AUTOPILOT,TYPE`: whom the mission was made for;
+  that of five items; `unread=LIST`; `made=AUTOPILOT,TYPE`: whom the mission was made for;
 - NAME=VALUE: its parameters; those that it `has` and `lacks` beside; `timed=NAME:VALUE,...`: those
   that the mission is timed for; `elsewhere`, `untimed`, `streamed`.
 
@@ -49,20 +49,20 @@ PLACES = {
 
 def within(radius: float) -> Mission:
     circle = Circle((HOME.latitude, HOME.longitude), radius, inclusion=True)
-    return a_mission(12, fence=Fence(circles=(circle,)))
+    return a_mission(5, fence=Fence(circles=(circle,)))
 
 
-FAR = a_mission(12, shift=0.02)
+FAR = a_mission(5, shift=0.02)
 MISSIONS: dict[str, Mission] = {
-    "": a_mission(12),
-    "homeless": replace(a_mission(12), home=None),
-    "heightless": replace(a_mission(12), home=Home(HOME.latitude, HOME.longitude, math.nan)),
+    "": a_mission(5),
+    "homeless": replace(a_mission(5), home=None),
+    "heightless": replace(a_mission(5), home=Home(HOME.latitude, HOME.longitude, math.nan)),
     "far": replace(FAR, items=FAR.items[1:]),  # 2 km from its home
-    "shifted": a_mission(12, shift=1e-4),
-    "rally": a_mission(12, rally=RALLY),
+    "shifted": a_mission(5, shift=1e-4),
+    "rally": a_mission(5, rally=RALLY),
     "fenced": within(2000.0),
     "wide": within(5000.0),
-    "otherwise": a_mission(12, fence=FENCE),
+    "otherwise": a_mission(5, fence=FENCE),
 }
 
 
