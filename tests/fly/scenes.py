@@ -122,7 +122,7 @@ def away(metres: float, higher: float = 0.0) -> Home:
 
 
 def fly(mission: Mission, _: Vehicle | None = None) -> Track:
-    """Return a flight from home over all places at 10 m/s; landing where it started."""
+    """Return a flight from home over all places at 20 m/s; landing where it started."""
     assert mission.home is not None
     frame = LocalFrame(mission.home.latitude, mission.home.longitude)
     corners = [(np.zeros(3), 0)]
@@ -133,7 +133,7 @@ def fly(mission: Mission, _: Vehicle | None = None) -> Track:
         else:
             corners.append((np.append(frame.to_local(item.x, item.y), item.z), index))
     points, items = (np.array(column) for column in zip(*corners, strict=True))
-    times = np.cumsum([0.0, *(np.linalg.norm(b - a) / 10.0 for a, b in pairwise(points))])
+    times = np.cumsum([0.0, *(np.linalg.norm(b - a) / 20.0 for a, b in pairwise(points))])
     t = np.linspace(0.0, times[-1], int(times[-1] * 10) + 2)
     position = np.column_stack([np.interp(t, times, points[:, k]) for k in range(3)])
     following = np.searchsorted(times[1:], t, side="left").clip(max=len(times) - 2)
@@ -208,6 +208,13 @@ PICKED: dict[str, Picks] = {
 }
 
 
+def holding(mission: Mission, mock: MockAutopilot) -> MockAutopilot:
+    """Return `mock`, which holds `mission` now."""
+    for part in MissionType:
+        mock.lists.replace(part, wire_items(mission, part, vehicle_of(mock.behaviour.family.key)))
+    return mock
+
+
 def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
     """Return what `mock` holds, as if it had been read, without the parameters `untold`."""
     values = mock.parameters.values.items()
@@ -241,10 +248,8 @@ class Scene:
             options["parameters"] = {"GUID_TIMEOUT": 1.0, **options.get("parameters", {})}
         behaviour = behaviour_of(cast(MockKind, kind))
         self.home = options.setdefault("home", HOME)
-        self.mock: Any = MockAutopilot(behaviour, **options)
+        self.mock: Any = holding(mission, MockAutopilot(behaviour, **options))
         self.mock.flight._fly = fly
-        for part in MissionType:
-            self.mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
         flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
         gate = Clearance(flight, peer_of(kind), held_by(self.mock), elsewhere)
         self.watch: Any = Stream(gate) if solution else Watch(gate, arm=arm, lands=lands)
@@ -410,9 +415,8 @@ class Judge(Counted):
         assert told is not None
         plan = self.scene.solution.plan
         own = self.machine._family.local_frame(home.latitude, home.longitude)
-        plans = LocalFrame(plan.origin.latitude, plan.origin.longitude)
-        to = plans.to_local(*own.to_geodetic([setpoint.y, setpoint.x]))
-        place = plans.to_local(told.lat / 1e7, told.lon / 1e7)
+        to = plan.origin.frame.to_local(*own.to_geodetic([setpoint.y, setpoint.x]))
+        place = plan.origin.frame.to_local(told.lat / 1e7, told.lon / 1e7)
         self.setpoints.append((now, -setpoint.z))
         up = home.altitude - setpoint.z - told.alt / 1000
         across, speed = float(np.hypot(*(to - place))), plan.max_ground_speed

@@ -21,8 +21,8 @@ from typing import Any
 
 import pytest
 from conftest import FLYABLE, edited
-from scenes import Scene, away, held_by
-from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of, vehicle_of
+from scenes import Scene, away, held_by, holding
+from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of
 
 from faao_mav import parse_plan, plan_mission
 from faao_mav.autopilot import Vehicle
@@ -36,7 +36,6 @@ from faao_mav.validate import Finding, Level
 from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
 from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.transfer import PartReport
-from faao_mav.wire.wire_items import wire_items
 
 GATE = Path(__file__).parents[1] / "data" / "fly" / "gate.txt"
 LEVELS = {"errs": Level.ERROR, "warns": Level.WARNING, "notes": Level.NOTE}
@@ -64,13 +63,6 @@ MISSIONS: dict[str, Mission] = {
     "wide": within(5000.0),
     "otherwise": a_mission(5, fence=FENCE),
 }
-
-
-def holding(mission: Mission, kind: str, parameters: Mapping[str, float]) -> MockAutopilot:
-    mock = mock_of(kind, parameters=parameters)
-    for part in MissionType:
-        mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
-    return mock
 
 
 def found(flight: Flight, mock: MockAutopilot, told: Mapping[str, str]) -> dict[str, Finding]:
@@ -124,7 +116,7 @@ def test_what_stands_against_a_flight(
     kind: str, told: dict[str, str], wrong: list[str], says: list[list[str]]
 ) -> None:
     values = {name: float(value) for name, value in told.items() if name.isupper()}
-    mock = holding(MISSIONS[told.get("holds", "")], kind, values)
+    mock = holding(MISSIONS[told.get("holds", "")], mock_of(kind, parameters=values))
     mock.parameters.values.update(numbers(told.get("has", "")))
     autopilot, _, made = told.get("made", "").partition(",")
     flight = Flight(
@@ -156,12 +148,13 @@ def test_a_plan_tells_what_the_flight_takes_of_the_battery() -> None:
     assert check.energy is not None
     takes = 100 * check.energy.total / 20
     flight = Flight.planned(conversion, result.solution)
-    mock = holding(conversion.mission, "ardupilot", conversion.vehicle.parameters)
+    tuned = mock_of("ardupilot", parameters=conversion.vehicle.parameters)
+    mock = holding(conversion.mission, tuned)
     findings = found(flight, mock, {"battery": f"{int(takes) + 19}"})
     assert errors(findings) == {"battery-low"}
     assert f"takes {takes:.0f} %, and is to leave 20 %" in findings["battery-low"].message
     assert errors(found(flight, mock, {"battery": f"{int(takes) + 22}"})) == set()
-    slow = holding(conversion.mission, "ardupilot", {})
+    slow = holding(conversion.mission, mock_of("ardupilot"))
     assert errors(found(flight, slow, {})) >= {"timing-other"}
     assert errors(found(flight, slow, {"untimed": ""})) == set()
 

@@ -125,7 +125,7 @@ def test_what_becomes_of_it(
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(n, marks=[pytest.mark.slow] * (n >= 6)) for n in range(30)]
+    "seed", [pytest.param(n, marks=[pytest.mark.slow] * (n >= 4)) for n in range(30)]
 )
 def test_in_no_trouble_what_must_not_happen_does(seed: int) -> None:
     """The first flights that meet trouble at random: any number of seeds can be flown."""
