@@ -9,12 +9,11 @@ from conftest import SMALL
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from faao_mav.errors import InputError
-from faao_mav.mission import Command, Frame, Home, fence
+from faao_mav.mission import Command, Frame, Home, Mission, MissionItem, fence, item
 from faao_mav.mission.fence import MAX_CORNERS, Circle, Fence, LatLon, Polygon, RallyPoint
-from faao_mav.mission.formats import read_mission, write_qgc_plan
+from faao_mav.mission.formats import qgc_plan, wpl, write_qgc_plan
 from faao_mav.mission.formats.fence_file import read_fence
-from faao_mav.mission.formats.qgc_plan import read_qgc_plan
-from faao_mav.mission.item import MAX_ITEMS, Mission, MissionItem
+from faao_mav.mission.item import MAX_ITEMS
 from faao_mav.plan import parse_plan, read_plan, yaml_text
 
 
@@ -64,26 +63,31 @@ def test_what_is_impossible_is_refused() -> None:
             kind(*arguments)
 
 
-def test_all_outlines_count_by_kind_and_where_they_cross(tmp_path: Path) -> None:
+def test_all_outlines_count_by_kind_and_where_they_cross(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert (fence.MAX_CORNERS, fence.MAX_CROSSINGS) == (8_192, 50_000)
+    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)
+    monkeypatch.setattr(fence, "MAX_CROSSINGS", 500)
     few = Polygon(ring(400, 1), False)
-    assert Fence((few, Polygon(ring(7_792), False)))
-    with pytest.raises(InputError, match="8,193 corners and circles; at most 8,192 are accepted"):
-        Fence((few, Polygon(ring(7_793), False)))
+    assert Fence((few, Polygon(ring(600), False)))
+    with pytest.raises(InputError, match="1,001 corners and circles; at most 1,000 are accepted"):
+        Fence((few, Polygon(ring(601), False)))
     for inclusion in (True, False):
         circles = (Circle((1.0, 2.0), 3.0, inclusion),) * 255
         assert Fence((), circles)
         with pytest.raises(InputError, match=r"256 (in|ex)clusion circles"):
             Fence((), (*circles, circles[0]))
-    turns = [complex(math.cos(2.4 * k), math.sin(2.4 * k)) / 1e3 for k in range(100)]
+    turns = [complex(math.cos(2.4 * k), math.sin(2.4 * k)) / 1e3 for k in range(14)]
     star = Polygon(tuple((each.real, each.imag) for each in turns), False)
-    teeth = Polygon(comb(1_000, across=False), False)
-    rings = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(100))
+    teeth = Polygon(comb(100, across=False), False)
+    rings = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(10))
     assert Fence((star,) * 3)
-    assert Fence((teeth,), rings[:5])
-    for polygons, around in (((star,) * 81, ()), ((teeth,), rings)):
-        with pytest.raises(InputError, match="cross at more than 50,000 places"):
+    assert Fence((teeth,), rings[:2])
+    for polygons, around in (((star,) * 4, ()), ((teeth,), rings)):
+        with pytest.raises(InputError, match="cross at more than 500 places"):
             Fence(polygons, around)
-    crossing = tuple(comb(249, across=across) for across in (True, False))
+    crossing = tuple(comb(25, across=across) for across in (True, False))
     as_geojson(tmp_path / "x.geojson", *crossing, kind="field")
     with pytest.raises(InputError, match=r"x\.geojson: geometry: fence: its outlines cross at"):
         read_fence(tmp_path / "x.geojson")
@@ -92,41 +96,42 @@ def test_all_outlines_count_by_kind_and_where_they_cross(tmp_path: Path) -> None
 def test_the_fence_of_a_plan_and_that_of_its_file_have_the_limit_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)
+    monkeypatch.setattr(fence, "MAX_CORNERS", 100)
     path, drawn = tmp_path / "x.yaml", tmp_path / "x.geojson"
-    as_geojson(drawn, ring(600))
-    places = [{"latitude": north, "longitude": east} for north, east in ring(400, 1)]
+    as_geojson(drawn, ring(60))
+    places = [{"latitude": north, "longitude": east} for north, east in ring(40, 1)]
     zones = json.dumps([{"polygon": places}])
     path.write_text(f"{SMALL}fence: {{file: x.geojson, exclusion: {zones}}}\n")
     text = read_plan(path).text  # the copy beside a result, with all corners in it
-    assert sum(len(polygon.vertices) for polygon in parse_plan(text).geofence.polygons) == 1_000
-    as_geojson(drawn, ring(601))
-    with pytest.raises(InputError, match=r"x\.yaml: fence: 1,001 corners and circles"):
+    assert sum(len(polygon.vertices) for polygon in parse_plan(text).geofence.polygons) == 100
+    as_geojson(drawn, ring(61))
+    with pytest.raises(InputError, match=r"x\.yaml: fence: 101 corners and circles"):
         read_plan(path)
 
 
-def test_endless_lists_are_not_read_to_their_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    row, path = "\n0 0 3 16 0 0 0 0 1 1 1 1", tmp_path / "x.waypoints"
-    path.write_text("QGC WPL 110" + row * (MAX_ITEMS + 1))
-    assert len(read_mission(path).items) == MAX_ITEMS
-    path.write_text("QGC WPL 110" + row * (MAX_ITEMS + 2))
-    with pytest.raises(InputError, match="65,536 items; at most 65,535 are accepted"):
-        read_mission(path)
+def test_endless_lists_are_not_read_to_their_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert (MAX_ITEMS, yaml_text._MAX_VALUES) == (65_535, 6 * MAX_CORNERS)
+    for module in (item, qgc_plan, wpl):
+        monkeypatch.setattr(module, "MAX_ITEMS", 50)
+    monkeypatch.setattr(qgc_plan, "MAX_CORNERS", 50)
+    row = "\n0 0 3 16 0 0 0 0 1 1 1 1"
+    text = "QGC WPL 110" + row * 51
+    assert len(wpl.read_wpl(text).mission.items) == 50
+    with pytest.raises(InputError, match="51 items; at most 50 are accepted"):
+        wpl.read_wpl(text + row)
     with pytest.raises(InputError, match="256 rally points; at most 255"):
         Mission((), rally=(RallyPoint(1.0, 2.0, 3.0),) * 256)
     text = write_qgc_plan(Mission(()))
-    item = '{"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, 0, 1, 1, 1]}'
-    for key, one, most in (
-        ("mission.items", item, MAX_ITEMS),
-        ("geoFence.polygons", '{"version": 1, "polygon": [], "inclusion": true}', MAX_CORNERS),
-        ("rallyPoints.points", "[1, 1, 1]", MAX_CORNERS),
+    flown = '{"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, 0, 1, 1, 1]}'
+    for key, one in (
+        ("mission.items", flown),
+        ("geoFence.polygons", '{"version": 1, "polygon": [], "inclusion": true}'),
+        ("rallyPoints.points", "[1, 1, 1]"),
     ):
         inside = f'"{key.rpartition(".")[2]}": ['
-        with pytest.raises(InputError, match=rf"{key}: more than {most:,} values"):
-            read_qgc_plan(text.replace(inside, inside + ", ".join([one] * (most + 1))))
-    monkeypatch.setattr(yaml_text, "_MAX_VALUES", 1_000)
+        with pytest.raises(InputError, match=rf"{key}: more than 50 values"):
+            qgc_plan.read_qgc_plan(text.replace(inside, inside + ", ".join([one] * 51)))
+    monkeypatch.setattr(yaml_text, "_MAX_VALUES", 100)
     for value in ("[]", "{}", "1", "{a: 1}", "a: 1", "''"):
-        with pytest.raises(InputError, match=r"line 1, .* 1,000 keys and values"):
-            parse_plan("{a: [" + f"{value}," * 1_000 + "]}")
+        with pytest.raises(InputError, match=r"line 1, .* 100 keys and values"):
+            parse_plan("{a: [" + f"{value}," * 100 + "]}")
