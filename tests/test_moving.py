@@ -60,18 +60,8 @@ def test_a_track_is_straight_between_its_points_and_its_first_is_the_start(
     assert parse_plan(plan.text).radio == plan.radio
 
 
-@given(st.text(st.sampled_from('0123456789.,-+einfatusm_\n #ortlhgd"'), max_size=200))
-def test_any_text_is_a_track_or_told_in_a_line(text: str) -> None:
-    try:
-        moving(f"{HEAD}{text}\n")
-    except PlanError as error:
-        assert len(str(error).splitlines()) == 1
-        assert str(error).startswith(f"plan: {USER}.track")
-
-
-@pytest.mark.parametrize(
-    ("track", "told"),
-    [
+def test_what_is_wrong_with_a_track_is_told() -> None:
+    for track, told in (
         (HEAD, "0 points with a time; give 2 to"),
         (f"{HEAD}0,1,2\n", "1 points with a time"),
         (f"{HEAD}0,1,2\n20,1,2\n20,3,4\n", "line 4: time 20 s; give finite times that rise"),
@@ -86,34 +76,36 @@ def test_any_text_is_a_track_or_told_in_a_line(text: str) -> None:
         (HEAD + "".join(f"{t},0,0\n" for t in range(MAX_POINTS + 1)), "5,001 points with a time"),
         (f"{HEAD}7,0,0\n16,9,0\n", "ends 9 s after it begins, and flight.duration is 10 s"),
         ("convoy.txt", "convoy.txt: cannot be read"),
-    ],
-)
-def test_what_is_wrong_with_a_track_is_told(track: str, told: str) -> None:
-    message = refused(track)
-    assert message.startswith(f"plan: {USER}.track: ")
-    assert told in message
-    assert len(message.splitlines()) == 1
+    ):
+        message = refused(track)
+        assert message.startswith(f"plan: {USER}.track: ")
+        assert told in message
+        assert "\n" not in message
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
-        ({f"{USER}.position": [3, 60]}, "position: 3 m from the first place of track; leave"),
-        ({f"{USER}.velocity": [1, 0]}, "velocity: [1.0, 0.0]: track is given too; leave one out"),
-        ({f"{USER}.track": 3}, "track: 3: no file; give the name of a .csv with time_s and"),
-        ({f"{USER}.track": None}, "position: missing; give [east, north]"),
-        ({f"{BASE}.velocity": [999, 0], "flight.duration": 110}, "takes it to 110 km from the"),
-        ({f"{BASE}.velocity": [800, 800]}, "faster than any vehicle; give [east, north] in m/s"),
-        ({f"{BASE}.velocity": "fast"}, "velocity: 'fast': not two numbers"),
-        ({f"{BASE}.velocity": [math.nan, 0]}, "nan is not a finite number of m/s"),
-        ({"optimizer.method": "algorithm1"}, "algorithm1 (optimizer.method) knows none"),
-    ],
-)
-def test_what_does_not_go_with_a_station_that_moves_is_told(
-    changes: dict[str, Any], told: str
-) -> None:
-    long = WAY.replace("10,50,50", "1000,50,50")
-    assert told in refused(long, **changes)
+def test_what_does_not_go_with_a_station_that_moves_is_told() -> None:
+    long, rows = (
+        WAY.replace("10,50,50", "1000,50,50"),
+        (
+            ({f"{USER}.position": [3, 60]}, "position: 3 m from the first place of track; leave"),
+            (
+                {f"{USER}.velocity": [1, 0]},
+                "velocity: [1.0, 0.0]: track is given too; leave one out",
+            ),
+            ({f"{USER}.track": 3}, "track: 3: no file; give the name of a .csv with time_s and"),
+            ({f"{USER}.track": None}, "position: missing; give [east, north]"),
+            ({f"{BASE}.velocity": [999, 0], "flight.duration": 110}, "takes it to 110 km from the"),
+            (
+                {f"{BASE}.velocity": [800, 800]},
+                "faster than any vehicle; give [east, north] in m/s",
+            ),
+            ({f"{BASE}.velocity": "fast"}, "velocity: 'fast': not two numbers"),
+            ({f"{BASE}.velocity": [math.nan, 0]}, "nan is not a finite number of m/s"),
+            ({"optimizer.method": "algorithm1"}, "algorithm1 (optimizer.method) knows none"),
+        ),
+    )
+    for changes, told in rows:
+        assert told in refused(long, **changes)
 
 
 def test_a_file_of_a_track_is_in_the_text_of_the_plan(tmp_path: Path) -> None:
@@ -141,26 +133,23 @@ def test_a_file_of_a_track_is_in_the_text_of_the_plan(tmp_path: Path) -> None:
     assert plan.changed({"flight.duration": 9}).radio == plan.radio
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
+def test_what_is_wrong_with_gpx_is_told(tmp_path: Path) -> None:
+    for text, told in (
         ("", "ship.gpx: not XML"),
         ("<gpx/>", "ship.gpx: 0 points with a time"),
         ("<!DOCTYPE x><gpx/>", "ship.gpx: a document type or entities"),
         ('<gpx><trkpt lat="1" lon="2"/></gpx>', "point 1: lat '1', lon '2', time ''; give degrees"),
-    ],
-)
-def test_what_is_wrong_with_gpx_is_told(tmp_path: Path, text: str, told: str) -> None:
-    (tmp_path / "ship.gpx").write_text(text)
-    message = refused(str(tmp_path / "ship.gpx"))
-    assert told in message
-    assert len(message.splitlines()) == 1
+    ):
+        (tmp_path / "ship.gpx").write_text(text)
+        message = refused(str(tmp_path / "ship.gpx"))
+        assert told in message
+        assert "\n" not in message
 
 
 CIRCLING = """
 site: {origin: {latitude: -35.36, longitude: 149.165}}
 vehicle: {type: plane, min_speed: 12, max_speed: 20, max_airspeed: 20, max_acceleration: 1.4}
-flight: {start: [0, 150], end: [150, 0], altitude: 80, duration: 30, time_step: 0.5,
+flight: {start: [0, 150], end: [150, 0], altitude: 80, duration: 20, time_step: 0.5,
          start_velocity: free, end_velocity: free}
 radio:
   base_station: {position: [0, 0], power_dbm: 10}

@@ -2,7 +2,6 @@
 
 import copy
 import json
-import math
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -84,21 +83,11 @@ def test_what_is_dumped_is_loaded(data: dict[str, Any]) -> None:
     assert load_yaml(dump_yaml(data), "plan") == data
 
 
-@pytest.mark.parametrize(
-    ("wind", "velocity"),
-    [
-        ({"speed": 5, "from": 0}, (0, -5)),
-        ({"speed": 5, "from": 90, "gust": 2}, (-5, 0)),
-        ({"speed": 10, "from": 210}, (5, 10 * math.cos(math.radians(30)))),
-    ],
-)
-def test_the_wind_blows_away_from_where_it_comes_from(
-    wind: dict[str, float], velocity: tuple[float, float]
-) -> None:
+def test_the_wind_blows_away_from_where_it_comes_from() -> None:
     assert parse_plan(SMALL).wind == (0.0, 0.0)
-    assert parse_plan(
-        edited(SMALL, {"site.wind": wind, "vehicle.max_airspeed": 40})
-    ).wind == pytest.approx(velocity, abs=1e-9)
+    for speed, origin, velocity in ((5, 0, (0, -5)), (5, 90, (-5, 0)), (10, 210, (5, 75**0.5))):
+        wind = {"site.wind": {"speed": speed, "from": origin}, "vehicle.max_airspeed": 40}
+        assert parse_plan(edited(SMALL, wind)).wind == pytest.approx(velocity, abs=1e-9)
 
 
 def test_a_body_is_numbers_over_those_of_the_autopilots_simulator() -> None:
@@ -124,19 +113,6 @@ def test_message_names_key_value_and_what_is_accepted() -> None:
             wrong.append((changes, missing, message))
     assert wrong == []
     assert len(rows) > 70
-
-
-def test_required_keys() -> None:
-    for key in ("site.origin", "flight.start", "flight.end", "flight.duration", "flight.altitude",
-                "vehicle.max_speed", "vehicle.max_acceleration", "radio.base_station.position",
-                "radio.ground_user.position"):  # fmt: skip
-        data = section = load_yaml(SMALL, "test")
-        *parents, last = key.split(".")
-        for parent in parents:
-            section = section[parent]
-        del section[last]
-        with pytest.raises(PlanError, match=rf"{key}: missing; give "):
-            parse_plan(dump_yaml(data))
 
 
 def test_several_inclusions_mean_what_the_autopilot_makes_of_them() -> None:
@@ -200,16 +176,15 @@ def test_too_short_a_duration_says_how_long_it_takes() -> None:
         assert parse_plan(edited(SMALL, changes | {"flight.duration": needed})).flight.slots > 30
 
 
-@pytest.mark.parametrize(
-    ("text", "part"),
-    [
+def test_text_that_is_no_plan() -> None:
+    for text, part in (
         ("", "not nothing"),
         ("- 1\n", "not list"),
         ("flight: [1\n", "line 2"),
         ("a: 1\nb: 2\na: 3\n", "line 3, column 1: not valid YAML: the key 'a' stands twice"),
         ("a: &x 1\nb: *x\n", "line 2, column 4: aliases"),
-        ("{" * 1000, "nested more than 20 deep"),
-        ("[" * 190_000, "nested more than 20 deep"),
+        ("{" * 100, "nested more than 20 deep"),
+        ("[" * 5_000, "nested more than 20 deep"),
         ('a: !!float ""\n', "line 1, column 4: tags (tag:yaml.org,2002:float) are not used"),
         ("a: !!bool maybe\n", "line 1, column 4: tags (tag:yaml.org,2002:bool) are not used"),
         ("a: !!timestamp abc\n", "line 1, column 4: tags"),
@@ -218,8 +193,11 @@ def test_too_short_a_duration_says_how_long_it_takes() -> None:
         ("? [a]\n: 1\n", "a key has to be a word"),
         ("a: {1: 2}\n", "line 1, column 5: not valid YAML: a key has to be a word, not 1"),
         ("a: 1\n~: 2\n", "line 2, column 1: not valid YAML: a key has to be a word, not ~"),
-        ("a:\n\tb: 1\n", "line 2, column 1: not valid YAML: found character '\\t'"),
-        ("a:\n\tb: 1\n", "; indent with spaces"),
+        (
+            "a:\n\tb: 1\n",
+            "line 2, column 1: not valid YAML: found character '\\t' that cannot start "
+            "any token; indent with spaces",
+        ),
         ("QGC WPL 110\n", "a mission, not a plan; faao-mission validate takes missions"),
         ('{\n "fileType": "Plan"}', "a mission, not a plan"),
         ("a: !!python/object:os.system 1\n", "line 1"),
@@ -227,12 +205,10 @@ def test_too_short_a_duration_says_how_long_it_takes() -> None:
         ("a\x00b", "not valid YAML"),
         ("a: 1\n---\nb: 2\n", "line 2"),
         ("x" * 655_361, "at most 655,360"),
-    ],
-)
-def test_text_that_is_no_plan(text: str, part: str) -> None:
-    with pytest.raises(PlanError, match=r"^p\.yaml: ") as caught:
-        parse_plan(text, "p.yaml")
-    assert part in str(caught.value)
+    ):
+        with pytest.raises(PlanError, match=r"^p\.yaml: ") as caught:
+            parse_plan(text, "p.yaml")
+        assert part in str(caught.value)
 
 
 def test_a_file_is_read_with_mark_and_crlf_or_told(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_the_rotary_wing_is_that_of_the_paper() -> None:
         assert best == pytest.approx(speeds[(theirs / per_metre).argmin()], rel=5e-3)
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(st.floats(50, 5000), st.floats(1, 20), st.floats(1, 2))
 def test_two_measured_powers_are_kept(hover: float, at: float, more: float) -> None:
     bare = RotaryWing(TABLE.blade, TABLE.induced, 120.0, TABLE.induced_speed, 0.0, 20.0)
@@ -73,7 +73,7 @@ def test_the_fixed_wing_is_that_of_the_paper(
     assert float(PLANE(v, a)) == pytest.approx(drag + gained, rel=1e-3, abs=1e-6)
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(
     st.sampled_from([TABLE, TABLE.fitted(200.0, 180.0, 12.0), PLANE]),
     st.floats(3, 30),

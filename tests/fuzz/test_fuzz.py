@@ -11,10 +11,10 @@ from wire_targets import wire_targets
 
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
          "map", "map_table", "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
-TAPES = {"client": 30, "mock_ardupilot": 15, "mock_px4": 8, "signed": 150}
-SLOW = {"bin": 100, "npz": 150, "gain": 150, "rates": 150}
-CASES = dict.fromkeys(FILES, 300) | SLOW | TAPES
-"""Cases of each target in the suite; chosen: half a second, but for PX4's predicted flights."""
+TAPES = {"client": 15, "mock_ardupilot": 8, "mock_px4": 4, "signed": 75}
+SLOW = dict.fromkeys(("bin", "tlog", "ulg", "npz", "gain", "rates", "rows"), 60)
+CASES = dict.fromkeys(FILES, 120) | SLOW | TAPES
+"""Cases of each target in the suite; chosen: a quarter of a second. `run.py` tries many."""
 
 # pymavlink leaves a log open that it does not understand
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
@@ -46,5 +46,5 @@ def test_what_is_mutated_is_read_or_refused(found: dict[str, Target], name: str)
     for content in found[name].corpus:  # what once was a finding
         outcome(found[name], content)
     counts = fuzz(found[name], CASES[name], seed=0)
-    assert counts["read"] > CASES[name] / (10 if name in TAPES else 50)
-    assert name in TAPES or counts["refused"] > CASES[name] / 50
+    assert counts["read"] > (CASES[name] / 10 if name in TAPES else 0)
+    assert counts["refused"] or name in TAPES

@@ -8,6 +8,7 @@ import pytest
 
 from faao_mav.errors import MissionFileError
 from faao_mav.mission import Home, Mission
+from faao_mav.mission.fence import RallyPoint
 from faao_mav.mission.formats import read_mission, read_mission_file
 
 FOLDER = Path(__file__).parent.parent / "data" / "missions"
@@ -51,7 +52,8 @@ REFUSED = {
     "two_current.waypoints": "line 4, field current: '1'; expected 0: line 2 is already current",
     "header_only.waypoints": "a header but no items; expected row 0, the home position",
     "no_home_row.waypoints": "line 2, field command: '22'; expected 16: row 0 is the home",
-    "decimal_comma.waypoints": "line 5, field latitude: '-35,3625'; expected a finite number",
+    "decimal_comma.waypoints": "line 5, field latitude: '-35,3625'; expected a finite number "
+    "with a decimal point, not a comma from -90 to 90 degrees",
     "protobuf.waypoints": "line 1: 'QGC WPL PB 110'; expected 'QGC WPL 110'",
     "latin1.waypoints": "line 3: byte 0xe9 is not UTF-8; expected a text file",
     "nan_literal.plan": "mission.items[2].params[3]: nan; expected a finite number or null",
@@ -95,6 +97,10 @@ def test_the_sound_ones_are_read_the_odd_ones_with_warnings() -> None:
     assert all(file.mission.home is not None for file in files.values())
     warned = {name for name, file in files.items() if file.warnings}
     assert warned == {"gap.waypoints", "home_in_frame_3.txt"}
+    told = files["fence_and_rally.plan"]
+    assert (told.firmware, told.vehicle_type) == (12, 2)
+    assert told.mission.home == Home(47.397742, 8.545594, 488.2)
+    assert told.mission.fence.breach_return == RallyPoint(47.3975, 8.5455, 50.0)
 
 
 def test_the_others_are_refused() -> None:
@@ -103,11 +109,3 @@ def test_the_others_are_refused() -> None:
             read_mission(FOLDER / name)
         assert str(caught.value).startswith(f"{FOLDER / name}: ")
         assert "\n" not in str(caught.value)
-
-
-def test_what_else_a_plan_tells() -> None:
-    read = read_mission_file(FOLDER / "fence_and_rally.plan")
-    assert (read.firmware, read.vehicle_type) == (12, 2)
-    assert read.mission.home == Home(47.397742, 8.545594, 488.2)
-    assert read.mission.fence.breach_return is not None
-    assert read.mission.fence.breach_return.altitude == 50

@@ -59,7 +59,6 @@ def test_harmless_oddities_are_read_damage_is_named() -> None:
         (with_field(4, "+nan"), "field param1: '+nan'; expected a finite number or nan"),
         (with_field(4, "1_0"), "field param1: '1_0'"),
         (with_field(8, "90.01"), "field latitude: '90.01'"),
-        (with_field(8, "47,5"), "a finite number with a decimal point, not a comma from -90"),
         (with_field(10, "1e999"), "field altitude: '1e999'; expected a finite number"),
         (with_field(10, "9" * 500), "field altitude: '9999999"),
         (with_field(2, "10", HOME), "line 2, field frame: '10'; expected 0: row 0 is the home"),
@@ -168,7 +167,6 @@ def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
         ("x.waypoints", b"QGC WPL 110\n\xff\xfe", "line 2: byte 0xff is not UTF-8"),
         ("x.waypoints", b"#" * 16_000_001, "more than 16,000,000 bytes"),
         ("x.plan", b"[" * 100_000, "nested too deep for a plan"),
-        ("x.plan", b'{"a": ' * 100_000, "nested too deep for a plan"),
     ):
         if content is not None:
             (tmp_path / name).write_bytes(content)
