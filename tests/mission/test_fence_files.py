@@ -45,7 +45,7 @@ def collection(*features: dict[str, Any], **more: Any) -> dict[str, Any]:
     return {"type": "FeatureCollection", "features": list(features)} | more
 
 
-OUT = [
+OUT: list[dict[str, Any]] = [
     {"Name": "No-fly zone 1"},
     {"NAME": "R-12", "TYPE": "PROHIBITED"},
     {"name": "Poly 2", "Type": "Exclusive", "Action": "Avoid"},
