@@ -36,11 +36,13 @@ def test_content_arrives_and_replaces(tmp_path: Path) -> None:
     assert [each.stat().st_mode & 0o777 for each in (longest, real)] == [0o640, 0o640]
 
 
-def test_a_failure_leaves_the_old_file_and_nothing_else(
+def test_a_failure_leaves_the_old_files_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "file.txt"
-    write_whole(path, b"old")
+    path, other = tmp_path / "file.txt", tmp_path / "other.txt"
+    write_together({path: b"old", other: b"old"})
+    with pytest.raises(InputError, match="absent/c: cannot be written"):
+        write_together({path: b"new", tmp_path / "absent" / "c": b"new"})
 
     def full(_: int) -> None:
         raise OSError(28, "No space left on device")
@@ -48,8 +50,8 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(InputError, match=r"file\.txt: cannot be written: No space left"):
         write_whole(path, b"new")
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
+    assert path.read_bytes() == other.read_bytes() == b"old"
+    assert {*tmp_path.iterdir()} == {path, other}
 
 
 def test_what_is_added_is_added_whole_or_not_at_all(tmp_path: Path) -> None:
@@ -101,14 +103,6 @@ def test_no_file_is_written_over_another_of_the_same_command(tmp_path: Path) -> 
             check_apart({"--out": tmp_path / name}, {"PLAN": plan})
     with pytest.raises(InputError, match=r"^--save .* is the file of --out too"):
         check_apart({"--out": other, "--save": other}, {"PLAN": plan})
-
-
-def test_files_that_belong_together_are_written_all_or_none(tmp_path: Path) -> None:
-    first, second = tmp_path / "a", tmp_path / "b"
-    write_together({first: b"1", second: b"2"})
-    with pytest.raises(InputError, match="absent/c: cannot be written"):
-        write_together({first: b"new", tmp_path / "absent" / "c": b"new"})
-    assert [path.read_bytes() for path in sorted(tmp_path.iterdir())] == [b"1", b"2"]
 
 
 def test_text_is_utf_8_within_a_limit_also_from_standard_input(

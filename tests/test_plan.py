@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, PX4_BODY
 from faao_mav.errors import InputError, PlanError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.plan import Plan, parse_plan, read_plan, reference
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
@@ -53,14 +52,6 @@ def test_the_paper_plan_is_section_iv() -> None:
     assert radio.reference_gain == pytest.approx(1e-5)
     assert radio.rician_factor == 3
     assert radio.modulation == "bpsk"
-
-
-def test_degrees_become_local_metres() -> None:
-    frame = LocalFrame(-35.363262, 149.165237)
-    latitude, longitude = frame.to_geodetic([30.0, 40.0])
-    where = {"latitude": float(latitude), "longitude": float(longitude)}
-    plan = parse_plan(edited(SMALL, {"flight.start": where}))
-    assert plan.flight.start == pytest.approx((30, 40), abs=1e-6)
 
 
 def test_values_are_those_of_yaml_1_2() -> None:
@@ -209,14 +200,6 @@ def test_text_that_is_no_plan() -> None:
         with pytest.raises(PlanError, match=r"^p\.yaml: ") as caught:
             parse_plan(text, "p.yaml")
         assert part in str(caught.value)
-
-
-def test_a_file_is_read_with_mark_and_crlf_or_told(tmp_path: Path) -> None:
-    path = tmp_path / "plan.yaml"
-    with pytest.raises(PlanError, match=r"plan\.yaml: cannot be read: No such file"):
-        read_plan(path)
-    path.write_bytes(b"\xef\xbb\xbf" + SMALL.replace("\n", "\r\n").encode())
-    assert read_plan(path).flight.slots == 20
 
 
 def test_method_replaces_the_plans() -> None:
