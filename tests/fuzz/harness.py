@@ -57,21 +57,21 @@ class Target:
 
 
 @contextmanager
-def limited(seconds: float = SECONDS, megabytes: int = MEGABYTES) -> Iterator[None]:
+def limited() -> Iterator[None]:
     """Let what runs inside have so much processor time and so much more memory than before.
 
     Beyond them it gets `_TooLongError` or MemoryError. Linux, main thread.
     """
 
     def stop(number: int, frame: FrameType | None) -> None:
-        raise _TooLongError(f"more than {seconds:g} s of processor time")
+        raise _TooLongError(f"more than {SECONDS:g} s of processor time")
 
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    most = pages * resource.getpagesize() + megabytes * 1_000_000
+    most = pages * resource.getpagesize() + MEGABYTES * 1_000_000
     before = signal.signal(signal.SIGPROF, stop)
     resource.setrlimit(resource.RLIMIT_AS, (most, hard))
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
     try:
         yield
     finally:
@@ -98,10 +98,9 @@ def outcome(target: Target, content: bytes) -> str:
         raise Finding(f"{target.name}: {kind}: {failure}: {content[:200]!r}") from failure
     else:
         return ""
-    printable = message.replace("\n", "").isprintable()
-    if not (0 < len(message) <= _LONGEST_MESSAGE and printable):
-        raise Finding(f"{target.name}: message {message[:200]!r}: {content[:200]!r}")
-    return message
+    if 0 < len(message) <= _LONGEST_MESSAGE and message.replace("\n", "").isprintable():
+        return message
+    raise Finding(f"{target.name}: message {message[:200]!r}: {content[:200]!r}")
 
 
 def fuzz(target: Target, cases: int, seed: int) -> Counter[str]:
@@ -116,13 +115,8 @@ def fuzz(target: Target, cases: int, seed: int) -> Counter[str]:
         try:
             counts["refused" if outcome(target, content) else "read"] += 1
         except Finding:
-            keep(target, content)
+            folder = CORPUS / target.name
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / hashlib.sha256(content).hexdigest()[:12]).write_bytes(content)
             raise
     return counts
-
-
-def keep(target: Target, content: bytes) -> None:
-    """Add a finding to the corpus, under a name made of its content."""
-    folder = CORPUS / target.name
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / hashlib.sha256(content).hexdigest()[:12]).write_bytes(content)

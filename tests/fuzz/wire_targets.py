@@ -140,7 +140,7 @@ def _hear(tape: bytes) -> object:
 
 
 def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
-    """Say in every way what became of `job`, and return the verdicts on its lists."""
+    """Say what became of `job`, and return the verdicts on its lists."""
     outcome = job.outcome
     if isinstance(outcome, tuple) and outcome and isinstance(outcome[0], dict):
         mission = mission_of(outcome[0], peer.vehicle)
@@ -149,9 +149,7 @@ def _told(job: Machine[Any], peer: Peer, found: FoundVehicle) -> list[str]:
     elif isinstance(outcome, tuple):
         problems = tuple(explain(each, peer, _MISSION) for each in outcome if not each.verified)
         report = UploadReport(found, outcome, 1.0, problems)
-        lines = str(report).split("\n")
-        assert all(line.isprintable() for line in lines), lines
-        assert report.verified == any(line.startswith("verified") for line in lines), lines
+        assert str(report).replace("\n", "").isprintable(), report
         json.dumps(as_dict(report), allow_nan=False)
         return [each.verdict for each in outcome]
     return []
