@@ -54,7 +54,9 @@ class LocalFrame:
         """
         east, north = np.moveaxis(np.asarray(positions, dtype=float), -1, 0)
         longitude, latitude = self._projection(east, north, inverse=True)
-        return np.asarray(latitude), _normalised(np.asarray(longitude))
+        inside = (longitude >= -180) & (longitude < 180)  # which keep their bits
+        wrapped = np.where(inside, longitude, np.mod(longitude + 180, 360) - 180)
+        return np.asarray(latitude), np.where(wrapped >= 180, -180.0, wrapped)
 
     def to_local(self, latitude: ArrayLike, longitude: ArrayLike) -> Real:
         """Return positions (..., 2) in metres of `latitude`, `longitude` in degrees, each (...)."""
@@ -75,10 +77,3 @@ def _projection(latitude: float, longitude: float, radius: float | None) -> "Pro
 
     earth = {"datum": "WGS84"} if radius is None else {"R": radius}
     return Proj(proj="aeqd", lat_0=latitude, lon_0=longitude, units="m", **earth)
-
-
-def _normalised(longitude: Real) -> Real:
-    """Return `longitude` in [-180, 180); values inside keep their bits."""
-    inside = (longitude >= -180) & (longitude < 180)
-    wrapped = np.where(inside, longitude, np.mod(longitude + 180, 360) - 180)
-    return np.where(wrapped >= 180, -180.0, wrapped)

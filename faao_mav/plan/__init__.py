@@ -5,18 +5,9 @@
 """
 
 from faao_mav.plan.keys import reference as reference
-from faao_mav.plan.radio import BaseStation as BaseStation
-from faao_mav.plan.radio import GroundUser as GroundUser
 from faao_mav.plan.radio import Radio as Radio
 from faao_mav.plan.reader import Plan as Plan
 from faao_mav.plan.reader import parse_plan as parse_plan
 from faao_mav.plan.reader import read_plan as read_plan
-from faao_mav.plan.sections import Flight as Flight
-from faao_mav.plan.sections import Goal as Goal
-from faao_mav.plan.sections import MissionOptions as MissionOptions
-from faao_mav.plan.sections import Optimizer as Optimizer
-from faao_mav.plan.sections import Origin as Origin
-from faao_mav.plan.sections import Site as Site
 from faao_mav.plan.sections import Wind as Wind
-from faao_mav.plan.vehicle import VehicleOptions as VehicleOptions
 from faao_mav.vector import Vector as Vector

@@ -274,7 +274,7 @@ def _goal(plan: PlanContents) -> Iterator[str]:
             f"goal.{goal.searches}: counts what is delivered, which radio.causal: false "
             "does not plan for; give radio.causal: true"
         )
-    if goal.counts_energy and plan.vehicle.power is None:
+    if goal.searches in ("minimise: energy", "maximise: data") and plan.vehicle.power is None:
         yield f"goal.{goal.searches}: {_NO_POWER}"
 
 

@@ -3,12 +3,10 @@
 import difflib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
-from functools import cache
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from faao_mav.autopilot import autopilots, kinds
 from faao_mav.plan.fields import Written, listed
 from faao_mav.plan.model import PlanFile
 
@@ -51,13 +49,6 @@ def reference() -> Mapping[str, PlanKey]:
     >>> reference()["mission.max_items"].accepted
     'a whole number, 2 to 65535'
     """
-    return _reference(autopilots(), kinds())
-
-
-@cache
-def _reference(names: tuple[str, ...], kinds: tuple[str, ...]) -> Mapping[str, PlanKey]:
-    """Return the keys where vehicles of these `names` and `kinds` are known."""
-    del names, kinds
     return {key.path: key for key in _below(PlanFile, "")}
 
 

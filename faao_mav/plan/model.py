@@ -236,15 +236,13 @@ def ground_areas(
     if barred.is_empty:
         return ()
     by = max(max(_steps(each)) for each in maps) / 2
-    found = _simplified(barred, by, kept)
+    found, places = _simplified(barred, by, kept), shapely.points(kept)
     for _ in range(_COARSER):
         if shapely.get_num_coordinates(found) <= _MOST_CORNERS:
             break
         by *= 2
         simpler = _simplified(barred, by, kept)
-        if any(
-            simpler.covers(shapely.Point(p)) and not found.covers(shapely.Point(p)) for p in kept
-        ):
+        if (shapely.covers(simpler, places) & ~shapely.covers(found, places)).any():
             break
         found = simpler
     return tuple(Area("the ground", False, part) for part in shapely.get_parts(found))
@@ -285,11 +283,8 @@ def _simplified(barred: "BaseGeometry", by: float, kept: Sequence[Vector]) -> "B
 
     closed = barred.buffer(by, join_style="mitre").buffer(-by, join_style="mitre")
     wide = closed.union(barred).buffer(by, join_style="mitre").simplify(by).union(barred)
-    places = [shapely.Point(place) for place in kept]
-    parts = []
+    places, parts = shapely.points(kept), []
     for part in shapely.get_parts(wide):
-        holes = [
-            ring for ring in part.interiors if any(shapely.Polygon(ring).covers(p) for p in places)
-        ]
+        holes = [r for r in part.interiors if shapely.covers(shapely.Polygon(r), places).any()]
         parts.append(shapely.Polygon(part.exterior, holes))
     return shapely.union_all(parts)

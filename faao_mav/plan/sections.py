@@ -220,11 +220,6 @@ class Goal:
             return f"minimise: {self.minimise}"
         return "maximise: data" if self.maximise == "data" else ""
 
-    @property
-    def counts_energy(self) -> bool:
-        """Whether the energy of the flight has a part in the goal."""
-        return self.minimise == "energy" or self.maximise == "data"
-
 
 @section
 class CircleZone:
