@@ -7,7 +7,7 @@ from typing import Any
 
 from harness import Target
 from simulate import Station, simulate
-from stations import FENCE, HOME, KINDS, RALLY, VEHICLE, peer_of
+from stations import FENCE, HOME, KINDS, RALLY, VEHICLE, a_mission, peer_of
 from tapes import answer, converse, datagrams, mutated, packed, tape_of
 
 from faao_mav.cli.vehicle import as_dict
@@ -18,12 +18,7 @@ from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire.codec import Codec, Framer
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.jobs import (
-    UploadReport,
-    download_lists,
-    explain,
-    upload_parts,
-)
+from faao_mav.wire.jobs import UploadReport, download_lists, explain, upload_parts
 from faao_mav.wire.machine import Machine, Script, Talk, ask_alive, ask_for
 from faao_mav.wire.messages import (
     CommandLong,
@@ -37,29 +32,14 @@ from faao_mav.wire.messages import (
     Statustext,
     Timesync,
 )
-from faao_mav.wire.protocol import (
-    GROUND_STATION,
-    HOME_POSITION,
-    MavCommand,
-    MissionType,
-)
+from faao_mav.wire.protocol import GROUND_STATION, HOME_POSITION, MavCommand, MissionType
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer import Peer
 from faao_mav.wire.wire_items import mission_of, wire_items
 
-_MISSION = Mission(
-    (
-        MissionItem(22, 3, x=-35.363262, y=149.165237, z=20.0),
-        MissionItem(16, 3, (3.0, 0.0, 0.0, 0.0), -35.3620, 149.1650, 30.0),
-        MissionItem(178, 2, (1.0, 4.0, -1.0, 0.0)),
-        MissionItem(16, 3, x=-35.3630, y=149.1660, z=25.0),
-        MissionItem(177, 2, (2.0, 1.0, 0.0, 0.0)),
-        MissionItem(20, 2),
-    ),
-    HOME,
-    FENCE,
-    RALLY,
-)
+_ITEMS = (*a_mission(4).items[:3], MissionItem(178, 2, (1.0, 4.0, -1.0, 0.0)),
+          MissionItem(177, 2, (2.0, 1.0, 0.0, 0.0)), MissionItem(20, 2))  # fmt: skip
+_MISSION = Mission(_ITEMS, HOME, FENCE, RALLY)
 """What is uploaded: some of each list."""
 
 _COMMANDS = (
