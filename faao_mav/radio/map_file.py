@@ -169,7 +169,8 @@ def _table(path: str | Path) -> dict[str, Real]:
         raise InputError(f"{path}: {error}") from None
     columns = {name: np.array(values) for name, values in lists.items()}
     names, rows = ("height_m", "north_m", "east_m"), len(columns["east_m"])
-    places = [columns.get(name, np.zeros(rows)).round(_SAME) for name in names]
+    with np.errstate(over="ignore"):  # such places are refused with the others that are far off
+        places = [columns.get(name, np.zeros(rows)).round(_SAME) for name in names]
     sides, at = zip(*(np.unique(place, return_inverse=True) for place in places), strict=True)
     shape = tuple(map(len, sides))
     if math.prod(shape) > MAX_VALUES:

@@ -103,12 +103,13 @@ def outcome(target: Target, content: bytes) -> str:
     raise Finding(f"{target.name}: message {message[:200]!r}: {content[:200]!r}")
 
 
-def fuzz(target: Target, cases: int, seed: int) -> Counter[str]:
+def fuzz(target: Target, cases: int) -> Counter[str]:
     """Return how many of `cases` mutated inputs were read and how many were refused.
 
-    Raises `Finding` with the input, which is added to the corpus.
+    Another number of cases draws others. Raises `Finding` with the input, which is added to the
+    corpus.
     """
-    random, inputs = Random(f"{target.name} {seed}"), (*target.seeds, *target.corpus)
+    random, inputs = Random(f"{target.name} {cases}"), (*target.seeds, *target.corpus)
     counts: Counter[str] = Counter()
     for _ in range(cases):
         content = target.mutate(random.choice(inputs), inputs, random)
