@@ -9,9 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 from harness import Target, fuzz, outcome
-from tapes import datagrams
 from targets import targets
-from wire_targets import wire_targets
+from wire_targets import datagrams, wire_targets
 
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
          "map", "map_table", "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
