@@ -31,16 +31,13 @@ def geofence(contents: PlanFile, source: str) -> Fence:
     of_file = _read(options, source, frame)
     zones = [(zone, True) for zone in options.inclusion]
     zones += [(zone, False) for zone in options.exclusion]
-    polygons = [
-        Polygon(_degrees(frame, zone.polygon), inclusion)
-        for zone, inclusion in zones
-        if isinstance(zone, PolygonZone)
-    ]
-    circles = [
-        Circle(_degrees(frame, [zone.center])[0], zone.radius, inclusion)
-        for zone, inclusion in zones
-        if isinstance(zone, CircleZone)
-    ]
+    polygons, circles = [], []
+    for zone, inclusion in zones:
+        if isinstance(zone, PolygonZone):
+            polygons.append(Polygon(_degrees(frame, zone.polygon), inclusion))
+        elif isinstance(zone, CircleZone):
+            (center,) = _degrees(frame, [zone.center])
+            circles.append(Circle(center, zone.radius, inclusion))
     try:
         areas = (*polygons, *of_file.polygons), (*circles, *of_file.circles)
         fence = Fence(*areas, notes=of_file.notes)
