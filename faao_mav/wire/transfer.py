@@ -184,16 +184,10 @@ class _Exchange(Questions[int]):
         result = result or self.doubted
         return self.end("silent" if result is None else "refused", result)
 
-    def end(
-        self,
-        verdict: Verdict,
-        result: int | None = None,
-        found: tuple[WireItem, ...] = (),
-        number: int = 0,
-    ) -> PartReport:
+    def end(self, verdict: Verdict, result: int | None = None, **more: Any) -> PartReport:
         """Return how it ended."""
         said = tuple(dict.fromkeys(self._texts))
-        return PartReport(self._part, verdict, result, self.item, found, said, number)
+        return PartReport(self._part, verdict, result, self.item, said=said, **more)
 
 
 def send_list(
@@ -253,7 +247,7 @@ def send_list(
             case MissionAck(type=MavResult.ACCEPTED, opaque_id=number):
                 # Before the last item was asked for it can only be about something else.
                 if furthest == last:
-                    return exchange.end("accepted", MavResult.ACCEPTED, (), number)
+                    return exchange.end("accepted", MavResult.ACCEPTED, opaque_id=number)
             case MissionAck(type=MavResult.INVALID_SEQUENCE):
                 if exchange.times(current) > 1 and current + 1 < last:
                     exchange.answer(current)
@@ -317,6 +311,6 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
             ack = MissionAck(peer.address, part, MavResult.ACCEPTED)
             line.say(*[ack] * peer.manners.final_acks)
             found = tuple(items[seq] for seq in range(count))
-            return exchange.end("accepted", None, found, number)
+            return exchange.end("accepted", found=found, opaque_id=number)
         peer.late = 0.0 if wide else max(2 * peer.late, _LATE)
     return exchange.stop()

@@ -26,10 +26,9 @@ from faao_mav.wire.transport import open_transport
 from faao_mav.wire.wire_items import wire_items
 
 MISSION = MissionType.MISSION
-BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 
 
-@BOTH
+@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
 def test_a_mission_there_and_back(kind: MockKind) -> None:
     mission = a_mission(8, fence=FENCE, rally=RALLY)
     rows = places(wire_items(mission, MISSION, vehicle_of(kind)))
@@ -40,12 +39,9 @@ def test_a_mission_there_and_back(kind: MockKind) -> None:
         assert [part.part for part in report.parts] == list(MissionType)
         assert places(mock.lists.items(MISSION)) == rows
         found = download(connection, system=1)
-    assert places(wire_items(found, MISSION, vehicle_of(kind))) == rows
-    assert (found.fence, found.rally) == (FENCE, RALLY)
-    assert found.home in (HOME, None)  # asked for a few times only
-    with vehicle(kind) as (connection, mock):
-        for part in MissionType:
-            mock.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
+        assert places(wire_items(found, MISSION, vehicle_of(kind))) == rows
+        assert (found.fence, found.rally) == (FENCE, RALLY)
+        assert found.home in (HOME, None)  # asked for a few times only
         kept = upload(a_mission(4), connection, system=1)
         assert [part.part for part in kept.parts] == [MISSION]
         assert mock.mission().rally == RALLY
@@ -63,14 +59,6 @@ def test_other_ways_to_connect(listen: str, to: str) -> None:
         assert upload(a_mission(5), f"{to}:127.0.0.1:{port}", system=1).verified
 
 
-def test_no_space_says_the_limit_and_the_count() -> None:
-    with vehicle("ardupilot") as (connection, _):
-        report = upload(a_mission(700), connection, system=1)
-    (problem,) = report.problems
-    assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
-    assert "The vehicle says: Only 655 items are supported" in problem
-
-
 def test_the_mission_of_an_armed_vehicle_is_left_alone() -> None:
     with vehicle("px4") as (connection, mock):
         mock.flight.arm(0.0)
@@ -78,17 +66,6 @@ def test_the_mission_of_an_armed_vehicle_is_left_alone() -> None:
             upload(a_mission(5), connection, system=1)
         assert mock.mission().items == ()
         assert upload(a_mission(5), connection, system=1, allow_armed=True).verified
-
-
-def test_no_vehicle() -> None:
-    with vehicle("px4") as (connection, _):
-        for to, options, told in (
-            (f"udpout:127.0.0.1:{free_port()}", {}, r"no heartbeat of an autopilot within 0\.3 s"),
-            (connection, {"system": 9}, "the autopilot of system 9"),
-            (connection, {"component": 7}, "an autopilot with component number 7 within"),
-        ):
-            with pytest.raises(LinkError, match=told):
-                download(to, wait=0.3, **options)  # type: ignore[arg-type]
 
 
 def test_what_cannot_be_sent_or_logged_is_an_error_before_anything_is_sent(tmp_path: Path) -> None:
@@ -104,9 +81,8 @@ def test_what_cannot_be_sent_or_logged_is_an_error_before_anything_is_sent(tmp_p
     assert path.read_text() == "QGC WPL 110\n"
 
 
-def test_connections_that_are_none() -> None:
+def test_connections_that_are_none_or_cannot_be_opened() -> None:
     for text, told in (
-        ("", "expected udpin:HOST:PORT"),
         ("nonsense", "expected udpin:HOST:PORT"),
         ("udpin:14550", "expected udpin:HOST:PORT"),
         ("udpout::14550", "expected udpout:HOST:PORT"),
@@ -119,10 +95,7 @@ def test_connections_that_are_none() -> None:
     ):
         with pytest.raises(InputError, match=told):
             open_transport(text)
-
-
-def test_connections_that_cannot_be_opened() -> None:
-    for host in ("no-such-host.invalid", "127.0.0..1", "x" * 64 + ".org", ".", "\u2024"):
+    for host in ("no-such-host.invalid", "127.0.0..1", "x" * 64 + ".org"):
         with pytest.raises(LinkError, match="there is no host"):
             open_transport(f"udpout:{host}:14550")
     port = free_port(socket.SOCK_STREAM)
@@ -140,11 +113,7 @@ def test_connections_that_cannot_be_opened() -> None:
 def test_a_tcp_link_that_is_closed() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         connection = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-
-        def hang_up() -> None:
-            server.accept()[0].close()
-
-        thread = threading.Thread(target=hang_up)
+        thread = threading.Thread(target=lambda: server.accept()[0].close())
         thread.start()
         with pytest.raises(LinkError, match="the other side closed the connection"):
             download(connection, wait=3.0)
@@ -194,8 +163,6 @@ def test_a_serial_device_that_takes_no_bytes_is_told(
             while True:
                 os.write(full, bytes(64))
         time.sleep(0.02)
-    started = time.monotonic()
     with pytest.raises(LinkError, match=r"it has taken no bytes for 0\.2 s; is the vehicle"):
         upload(a_mission(5), line[1], system=1, wait=60.0)
-    assert time.monotonic() - started < 30  # of the 60 s for a vehicle to be found
     os.close(full)

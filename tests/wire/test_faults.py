@@ -64,12 +64,13 @@ def vehicle_holds(
     return places(mock.lists.items(part)) == places(rows)
 
 
-@settings(max_examples=120)
-@given(st.sampled_from(KINDS), st.integers(2, 12), bad_links, st.booleans())
+@settings(max_examples=60)
+@given(st.sampled_from(KINDS), st.integers(1, 8), bad_links, st.booleans())
 def test_no_wrong_mission_is_ever_called_verified(
     kind: MockKind, count: int, faults: Faults, occupied: bool
 ) -> None:
-    mock, rows = mock_of(kind), rows_for(kind, count)
+    """Nor one that was to be cleared and is still there."""
+    mock, rows = mock_of(kind), rows_for(kind, count) if count > 1 else ()
     if occupied:
         mock.lists.replace(MISSION, rows_for(kind, 7, shift=0.1))
     report, took = upload_to(mock, rows, faults, until=1000.0)
@@ -84,15 +85,17 @@ def test_no_wrong_mission_is_ever_called_verified(
 def test_what_a_link_does_is_overcome(kind: MockKind) -> None:
     """Loss; late packets and copies of them; and being dead for 3 s, but not for a minute."""
     late = Faults(duplication=0.05, reordering=0.1, delay=0.3)
-    lossy = (Faults(loss=x, latency=0.03, seed=n) for x in (0.05, 0.2, 0.3, 0.4) for n in range(9))
-    for faults in (*lossy, *(replace(late, seed=seed) for seed in range(6))):
-        mock, rows = mock_of(kind), rows_for(kind, 12 if faults.loss else 30)
-        report, took = upload_to(mock, rows, faults)
-        assert report.verified, faults
-        assert vehicle_holds(mock, rows)
-        assert took < 60 or faults.loss
+    lossy = (Faults(loss=x, latency=0.03, seed=n) for x in (0.05, 0.3, 0.4) for n in range(4))
+    for faults in (*lossy, *(replace(late, seed=seed) for seed in range(3))):
+        mock = mock_of(kind)
+        rows = rows_for(kind, 12 if faults.loss else 30)
+        for sent in (rows, ()):
+            report, took = upload_to(mock, sent, faults)
+            assert report.verified, faults
+            assert vehicle_holds(mock, sent)
+            assert took < 60 or faults.loss
     for begin, seconds, course in (
-        *((begin, 3.0, ("verified", 1)) for begin in (0.0, 0.05, 0.2, 0.5, 1.0)),
+        *((begin, 3.0, ("verified", 1)) for begin in (0.0, 0.05, 0.2, 0.5)),
         (0.2, 90.0, ("silent", 3)),
     ):
         faults = Faults(latency=0.01, outages=((begin, begin + seconds),))
@@ -115,15 +118,19 @@ def test_any_one_packet_may_be_lost(kind: MockKind) -> None:
 def test_refusals_of_every_kind_are_reported(kind: MockKind) -> None:
     cancelled = MavResult.OPERATION_CANCELLED
     for result in sorted(set(MavResult) - {MavResult.ACCEPTED, MavResult.INVALID_SEQUENCE}):
-        for seq in (COUNT, 1, 3, 5):
+        for seq in (COUNT, 3, 5):
             mock = mock_of(behaviour_of(kind, refusals={(MISSION, seq): result}))
-            report, _ = upload_to(mock, rows_for(kind, 6)[:6])
+            report, took = upload_to(mock, rows_for(kind, 6)[:6])
             verdict = "cancelled" if result == cancelled else "refused"
             assert (report.verdict, report.result) == (verdict, result)
             if result not in (*TENTATIVE, cancelled):
                 assert report.attempts == 1
                 assert report.item == (None if seq == COUNT else seq)
-    for seed in range(10):  # the item is named whatever is lost
+            elif (result, seq) == (MavResult.DENIED, COUNT):
+                assert took < 10
+                told = explain(report, peer_of("ardupilot"))
+                assert told == "mission: refused: DENIED (another ground station is uploading)"
+    for seed in range(5):  # the item is named whatever is lost
         mock = mock_of(behaviour_of(kind, refusals={(MISSION, 6): MavResult.INVALID_PARAM2}))
         report, _ = upload_to(mock, rows_for(kind, 12)[:12], Faults(loss=0.3, seed=seed))
         assert not report.verified
@@ -133,7 +140,7 @@ def test_refusals_of_every_kind_are_reported(kind: MockKind) -> None:
 @BOTH
 def test_another_ground_station_uploads_something_else_at_the_same_time(kind: MockKind) -> None:
     """One of the two is refused, or both come in turn: nobody is told a wrong thing."""
-    for head_start in range(4):
+    for head_start in range(2):
         mock = mock_of(kind)
         ours, theirs = rows_for(kind, 8), rows_for(kind, 9, shift=0.1)
         rival = Script(send_list(theirs, Peer(FOREIGN, VEHICLE, vehicle_of(kind))))
@@ -149,15 +156,14 @@ def test_a_late_copy_of_an_announcement_ends_no_download() -> None:
     """ArduPilot waits 8 s for items then, refuses downloads meanwhile, and says it has given up."""
     rows = wire_items(a_mission(6, fence=FENCE), FENCES, vehicle_of("ardupilot"))
     copy = Envelope(GROUND_STATION, MissionCount(VEHICLE, FENCES, len(rows)))
-    for late in (0.0, 0.15, 0.25):
-        mock = mock_of("ardupilot")
-        mock.lists.replace(FENCES, rows)
-        script: Any = Script(read_list(peer_of("ardupilot"), FENCES))
-        client, vehicle = Station(script, GROUND_STATION), Station(mock, VEHICLE)
-        events = [(late, lambda now, mock=mock: mock.on(copy, now))]
-        took = simulate(client, vehicle, Faults(latency=0.05), events=events)
-        assert (script.outcome.verdict, script.outcome.found) == ("accepted", rows)
-        assert took < 20
+    mock = mock_of("ardupilot")
+    mock.lists.replace(FENCES, rows)
+    script: Any = Script(read_list(peer_of("ardupilot"), FENCES))
+    client, vehicle = Station(script, GROUND_STATION), Station(mock, VEHICLE)
+    events = [(0.15, lambda now: mock.on(copy, now))]
+    took = simulate(client, vehicle, Faults(latency=0.05), events=events)
+    assert (script.outcome.verdict, script.outcome.found) == ("accepted", rows)
+    assert took < 20
 
 
 def test_what_a_vehicle_stores_otherwise_is_found_out_and_sent_again() -> None:
@@ -201,20 +207,6 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission_and_that_ends_the_uplo
     assert mock.lists.items(FENCES) == ()
 
 
-def test_clearing_over_a_bad_link() -> None:
-    for kind in KINDS:
-        for seed in range(10):
-            mock = mock_of(kind)
-            mock.lists.replace(MissionType.RALLY, rows_for("px4", 3))
-            faults = Faults(loss=0.4, seed=seed)
-            report, _ = upload_to(mock, (), faults, part=MissionType.RALLY)
-            assert report.verified
-            assert mock.lists.items(MissionType.RALLY) == ()
-    dead: Any = Script(upload_parts([(FENCES, ()), (MissionType.RALLY, ())], peer_of("px4")))
-    simulate(Station(dead, GROUND_STATION), Station(mock_of("px4"), VEHICLE), Faults(loss=1.0))
-    assert [report.verdict for report in dead.outcome] == ["silent"]
-
-
 def test_what_a_channel_does() -> None:
     assert Channel(Faults(latency=0.5), "x").carry(b"abc", 1.0) == [(1.5, b"abc")]
     assert Channel(Faults(loss=1.0), "x").carry(b"abc", 1.0) == []
@@ -226,11 +218,3 @@ def test_what_a_channel_does() -> None:
     assert 1.0 < late <= 3.1
     channel = Channel(Faults(rate=10.0, latency=0.5), "x")
     assert [channel.carry(b"abc", now)[0][0] for now in (1.0, 1.1, 9.0)] == [1.8, 2.1, 9.8]
-
-
-def test_a_vehicle_that_another_station_uploads_to_is_given_up_after_one_attempt() -> None:
-    mock = mock_of(behaviour_of("ardupilot", refusals={(0, COUNT): MavResult.DENIED}))
-    report, took = upload_to(mock, rows_for("ardupilot", 5))
-    assert took < 10
-    told = explain(report, peer_of("ardupilot"))
-    assert told == "mission: refused: DENIED (another ground station is uploading)"

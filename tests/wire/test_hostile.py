@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from faao_mav.sim import MockAutopilot, MockKind
 from faao_mav.wire import upload
 from faao_mav.wire.codec import Codec
 from faao_mav.wire.messages import (
-    CommandLong,
     Envelope,
     Message,
     MissionAck,
@@ -31,7 +29,7 @@ from faao_mav.wire.messages import (
     Statustext,
     WireItem,
 )
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MavResult, MissionType
+from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
 from faao_mav.wire.wire_items import mission_of
 
 NAN, INF = math.nan, math.inf
@@ -43,25 +41,17 @@ def row(
     return WireItem(command, 3, (p, 0.0, 0.0, 0.0), x, y, z)
 
 
-@pytest.mark.parametrize(
-    ("part", "rows", "message"),
-    [
+def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded() -> None:
+    for part, rows, told in (
         (MissionType.FENCE, [row(5001, p=NAN)] * 3, "fence: a polygon stops after 3"),
         (MissionType.FENCE, [row(5003, p=NAN)], "fence circle: radius nan"),
         (MissionType.FENCE, [row(5003, p=INF)], "fence item 0: params .inf.*finite numbers"),
-        (MissionType.FENCE, [row(5001, x=2 * 10**9, p=3.0)] * 3, "fence item 0: 200.0, 149.16"),
         (MissionType.RALLY, [row(5100, y=-(2**31))], r"rally points item 0: .* -214\.7483648"),
         (MissionType.MISSION, [row(16), row(16, x=2 * 10**9)], r"mission item 1: 200\.0, 149\.16"),
         (MissionType.MISSION, [row(16, INF)], "mission item 0: .* z inf; expected finite"),
-        (MissionType.MISSION, [row(16, p=-INF)], "mission item 0: params .-inf"),
-    ],
-    ids=str,
-)
-def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded(
-    part: MissionType, rows: list[WireItem], message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        mission_of({part: rows}, vehicle_of("px4"))
+    ):
+        with pytest.raises(InputError, match=told):
+            mission_of({part: rows}, vehicle_of("px4"))
 
 
 class _Liar(MockAutopilot):
@@ -96,16 +86,7 @@ def command(number: signal.Signals, arguments: list[str], **pipes: int) -> "subp
     return subprocess.Popen([sys.executable, "-c", code, *arguments], text=True, **nowhere | pipes)  # type: ignore[call-overload,no-any-return]
 
 
-@pytest.mark.parametrize(
-    ("kind", "number", "holds"),
-    [
-        ("ardupilot", signal.SIGTERM, "ArduPilot may now hold old and new items mixed"),
-        ("px4", signal.SIGHUP, "PX4 holds the old list or the new one, whole"),
-    ],
-)
-def test_an_upload_that_is_ended_from_outside_is_cancelled(
-    kind: MockKind, number: signal.Signals, holds: str, tmp_path: Path
-) -> None:
+def test_an_upload_that_is_ended_from_outside_is_cancelled(tmp_path: Path) -> None:
     path, cancelled = tmp_path / "m.waypoints", list[MissionAck]()
     path.write_text(write_wpl(a_mission(9, fence=FENCE)))
 
@@ -115,59 +96,51 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(
             if isinstance(message, MissionAck):
                 cancelled.append(message)
             if isinstance(message, MissionItemInt) and message.seq >= 2:
-                client.send_signal(number)
+                client.send_signal(signal.SIGTERM)
                 return ()
             return super()._receive(envelope, now)
 
-    with vehicle(kind, Ended) as (to, _):
+    with vehicle("ardupilot", Ended) as (to, _):
         arguments = ["upload", str(path), "--to", to, "--system", "1"]
-        client = command(number, arguments, stderr=subprocess.PIPE)
+        client = command(signal.SIGTERM, arguments, stderr=subprocess.PIPE)
         _, errors = client.communicate(timeout=PATIENCE)
         for _ in range(100):  # the mock hears of it a moment later
             if not cancelled:
                 time.sleep(0.02)
     assert client.returncode == 1
     assert "interrupted while uploading mission at item 3 of" in errors
-    assert f"cancelled. {holds}" in errors
+    assert "cancelled. ArduPilot may now hold old and new items mixed" in errors
     assert [ack.type for ack in cancelled] == [MavResult.OPERATION_CANCELLED]
 
 
-class _Told(MockAutopilot):
-    """It notes the orders that it is given."""
-
-    def _receive(self, envelope: Envelope, now: float) -> Any:
-        message = envelope.message
-        if isinstance(message, CommandLong) and message.command < MavCommand.SET_INTERVAL:
-            self.orders = [*getattr(self, "orders", []), message.command]
-        return super()._receive(envelope, now)
-
-
-def test_a_mission_goes_on_when_nobody_can_be_told_any_more(tmp_path: Path) -> None:
-    """A lost SSH session: a hang-up, and output that nobody reads."""
-    path, flights = tmp_path / "m.waypoints", list[tuple[_Told, subprocess.Popen[str]]]()
+def test_a_mission_goes_on_when_its_terminal_has_gone(tmp_path: Path) -> None:
+    """A lost SSH session hangs up."""
+    path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(a_mission(9)))
-    with ExitStack() as stack:
-        for _ in range(2):
-            to, mock = stack.enter_context(vehicle("ardupilot", _Told))
-            assert upload(a_mission(9), to, system=1).verified
-            arguments = ["fly", str(path), "--to", to, "--system", "1", "--arm"]
-            flights.append((mock, command(signal.SIGHUP, arguments, stdout=subprocess.PIPE)))
-        for mock, client in flights:
-            assert client.stdout is not None
-            assert any("the mission is under way" in line for line in client.stdout)
-            if client is flights[0][1]:
-                client.send_signal(signal.SIGHUP)
-                assert "the terminal has gone" in client.stdout.read()
-            client.stdout.close()
-            assert client.wait(timeout=PATIENCE) != 0
-            assert (mock.armed, mock.mode) == (True, 3)
-            assert mock.orders == [MavCommand.ARM, MavCommand.START]
+    with vehicle("ardupilot") as (to, mock):
+        assert upload(a_mission(9), to, system=1).verified
+        arguments = ["fly", str(path), "--to", to, "--system", "1", "--arm"]
+        client = command(signal.SIGHUP, arguments, stdout=subprocess.PIPE)
+        assert client.stdout is not None
+        assert any("the mission is under way" in line for line in client.stdout)
+        client.send_signal(signal.SIGHUP)
+        assert "the terminal has gone" in client.stdout.read()
+        client.stdout.close()
+        assert client.wait(timeout=PATIENCE) != 0
+        assert (mock.armed, mock.mode) == (True, 3)
 
 
+@pytest.mark.parametrize(
+    ("kind", "left"),
+    [
+        ("ardupilot", r"1 of 6\. ArduPilot may now hold old and new items mixed"),
+        ("px4", r"1 of 5\. PX4 holds the old list or the new one, whole"),
+    ],
+)
 def test_a_link_that_breaks_in_an_upload_says_what_is_left(
-    monkeypatch: pytest.MonkeyPatch,
+    kind: MockKind, left: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    mock = mock_of("ardupilot")
+    mock = mock_of(kind)
     theirs = Codec(VEHICLE)
     waiting = [(theirs.pack(message), "") for message in mock.start(0.0)]
 
@@ -182,9 +155,7 @@ def test_a_link_that_breaks_in_an_upload_says_what_is_left(
 
     air = Air(says, listens=False, waiting=waiting)
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
-    with pytest.raises(
-        LinkError, match=r"is gone, while uploading mission at item 1 of 6\. ArduPilot may now hold"
-    ):
+    with pytest.raises(LinkError, match=f"is gone, while uploading mission at item {left}"):
         upload(a_mission(5), "/dev/ttyACM0", system=1)
 
 

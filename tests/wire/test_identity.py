@@ -4,7 +4,6 @@ import time
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
-from unittest.mock import ANY
 
 import pytest
 from hypothesis import given
@@ -18,7 +17,6 @@ from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.preflight import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import download, upload
-from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec, message_id, sender_of
 from faao_mav.wire.discover import Heard, choose, discover
 from faao_mav.wire.machine import Script
@@ -66,15 +64,16 @@ def found(*beats: tuple[float, Address, Heartbeat], **options: Any) -> list[tupl
     return [(each.address, each.armed) for each in heard(*beats, **options)[0].vehicles]
 
 
-@pytest.mark.parametrize("component", [1, 154])
-def test_what_does_not_fly_is_no_autopilot_and_its_flag_arms_nothing(component: int) -> None:
+def test_what_does_not_fly_is_no_autopilot_and_its_flag_arms_nothing() -> None:
     """It says so all the time, in the vehicle's own name even."""
-    for kind in set(range(60)) - AIRFRAMES:
-        beside = Heartbeat(kind, (0, 3, 8, 12)[kind % 4], ARMED, 0, 4)
-        beats = [(step / 2, Address(1, component), beside) for step in range(30)]
-        assert found(*beats, (5.0, VEHICLE, BEAT)) == [(VEHICLE, False)]
-        assert found(*beats) == []
-        assert found(*beats, system=1, component=component) == []
+    for component in (1, 154):
+        for kind in set(range(60)) - AIRFRAMES:
+            beside = Heartbeat(kind, (0, 3, 8, 12)[kind % 4], ARMED, 0, 4)
+            beats = [(step / 2, Address(1, component), beside) for step in range(8)]
+            assert found(*beats, (1.0, VEHICLE, BEAT)) == [(VEHICLE, False)]
+            assert found(*beats, system=1, component=component) == []
+    armed = Heartbeat(COPTER, ARDUPILOT, ARMED, 0, 4)
+    assert found((0.1, VEHICLE, armed), (0.5, VEHICLE, BEAT)) == [(VEHICLE, True)]
 
 
 @given(
@@ -85,6 +84,7 @@ def test_what_does_not_fly_is_no_autopilot_and_its_flag_arms_nothing(component: 
 def test_component_1_is_it_whoever_else_says_so_and_whenever(
     others: list[tuple[float, int, int]], when: float, system: int | None
 ) -> None:
+    """Another component is it only where it is given."""
     beats = [
         (early, Address(1, component), Heartbeat(kind, 0, ARMED, 0, 4))
         for early, component, kind in others
@@ -92,30 +92,17 @@ def test_component_1_is_it_whoever_else_says_so_and_whenever(
     outcome, now = heard(*beats, (when, VEHICLE, BEAT), system=system)
     assert [(each.address, each.armed) for each in outcome.vehicles] == [(VEHICLE, False)]
     assert now <= when + 1.5
-
-
-def test_another_component_is_it_only_where_it_is_given() -> None:
-    assert heard((0.5, COMPANION, BEAT), (1.5, COMPANION, BEAT)) == (Heard((), ANY), 10.0)
     outcome, now = heard((0.5, COMPANION, BEAT), system=1, component=191)
     assert ([each.address for each in outcome.vehicles], now) == ([COMPANION], 0.5)
 
 
-def test_a_vehicle_is_armed_if_any_of_its_heartbeats_says_so() -> None:
-    armed = Heartbeat(COPTER, ARDUPILOT, ARMED, 0, 4)
-    assert found((0.1, VEHICLE, armed), (0.5, VEHICLE, BEAT)) == [(VEHICLE, True)]
-
-
 def test_who_cannot_be_meant_is_said_in_a_line() -> None:
-    crowd = [(0.5, Address(k % 255, k // 255), Heartbeat(2, 12, 0, 0, 3)) for k in range(20_000)]
-    companion = (0.1, Address(9, 154), Heartbeat(26, 8, 0, 0, 4))
-    meant = [companion, (0.2, VEHICLE, BEAT)]
+    crowd = [(0.5, Address(system, 1), BEAT) for system in range(255)]
+    meant = [(0.1, Address(9, 154), Heartbeat(26, 8, 0, 0, 4)), (0.2, VEHICLE, BEAT)]
     cases: list[tuple[int | None, list[tuple[float, Address, Heartbeat]], str]] = [
         (None, crowd, "several .*; and 250 more"),
-        (
-            9,
-            meant,
-            r"9 within 1 s; there is only MAV_TYPE 26 \(system 9, component 154\); ArduPilot",
-        ),
+        (9, meant, r"9 within 1 s; there is only MAV_TYPE 26 .system 9, component 154.; ArduPilot"),
+        (9, [], r"no heartbeat of the autopilot of system 9 within 1 s; is it switched on"),
     ]
     for number, autopilot, name in ((10, 3, "ArduPilot"), (22, 12, "PX4"), (0, 12, "PX4")):
         beat = (0.5, VEHICLE, Heartbeat(number, autopilot, 0, 0, 3))
@@ -215,25 +202,23 @@ def test_what_comes_later_from_elsewhere_does_not_count(
     assert counts == 1  # of what it was asked to give, by one vehicle
 
 
-@pytest.mark.parametrize("moment", ["uploading", "reading"])
-def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
+def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
     """A vehicle whose address changes in the middle is one that says nothing more.
 
-    A real ArduCopter whose power went while its list was read back came back at another port.
+    A real ArduCopter whose power went during a transfer came back at another port.
     """
     vehicles, notes = {HERE: a_mock(rate=0.0)}, list[str]()
     in_the_air(monkeypatch, vehicles)
 
     def observe(what: str, done: int, _: int) -> None:
-        if what.startswith(moment) and done >= 2 and HERE in vehicles:
+        if what.startswith("uploading") and done >= 2 and HERE in vehicles:
             vehicles[ELSEWHERE] = vehicles.pop(HERE)
 
     hurry(monkeypatch)
     monkeypatch.setattr("faao_mav.wire.jobs.ATTEMPTS", 2)
     report = upload(a_mission(60), "udpin:0.0.0.0:1", observe=observe, note=notes.append)
     assert [part.verdict for part in report.parts] == ["silent"]
-    assert ELSEWHERE in notes[0]
-    assert "If the vehicle's address has changed, begin again" in notes[0]
+    assert f"come from {ELSEWHERE} too, not only from" in notes[0]
     told = f"in its name come from {ELSEWHERE}: begin again if it is there now"
     assert told in report.problems[0]
 
@@ -318,25 +303,3 @@ def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> N
         upload(a_mission(5), "udpin:0.0.0.0:1", system=1)
     assert "SERIALn_PROTOCOL 2" in str(told.value)
     assert "\n" not in str(told.value)
-
-
-def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
-    """ArduPilot with SERIALn_PROTOCOL 1 or PX4 with MAV_PROTO_VER 1."""
-    pack = Codec.pack
-
-    def old(codec: Codec, message: Message) -> bytes:
-        packet = pack(codec, message)
-        if codec.address != VEHICLE:
-            return packet
-        decoded = common.MAVLink(None).decode(bytearray(packet))
-        if hasattr(decoded, "mission_type"):
-            decoded.mission_type = 0  # MAVLink 1 has no such field
-        return bytes(decoded.pack(common.MAVLink(None, 1, 1), force_mavlink1=True))
-
-    monkeypatch.setattr(Codec, "pack", old)
-    in_the_air(monkeypatch, {HERE: a_mock(rate=0.0)})
-    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1).verified
-    hurry(monkeypatch)
-    held = holdings("udpin:0.0.0.0:1", system=1)
-    assert len(held.mission.items) == 5
-    assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about

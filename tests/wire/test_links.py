@@ -11,61 +11,38 @@ from faao_mav.wire.messages import MissionItemInt, MissionRequestInt
 from faao_mav.wire.protocol import GROUND_STATION
 from faao_mav.wire.transfer import read_list, send_list
 
-BOTH = pytest.mark.parametrize("kind", KINDS)
+ROWS = 100
 
 
-def there_and_back(
-    kind: MockKind, count: int, faults: Faults, telemetry: float = 0.0
-) -> list[tuple[float, int, int]]:
-    """Return how an upload of `count` rows and reading them back went.
-
-    Seconds, and the items and requests that this end and the vehicle sent.
-    """
-    mock, peer, courses = (
-        MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry),
-        peer_of(kind),
-        [],
-    )
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("faults", "telemetry", "seconds", "up", "back"),
+    [
+        (Faults(), 0.0, 1.0, 1.0, 1.0),
+        (Faults(loss=0.05), 0.0, 3.0, 1.3, 1.3),
+        (Faults(loss=0.2), 0.0, 8.0, 2.0, 2.0),
+        # 20 reports a second take two thirds of what this line can carry.
+        (Faults(latency=0.03, rate=2500.0), 20.0, 25.0, 1.3, 1.3),
+        (Faults(latency=0.15, reordering=1.0, delay=0.1, seed=1), 0.0, 90.0, 1.2, 1.7),
+        # PX4 asks again after 0.25 s, ArduPilot after 1 s, and is answered each time.
+        (Faults(latency=0.5), 0.0, 220.0, 2.1, 1.2),
+        (Faults(latency=0.1, rate=960.0, loss=0.1, seed=1), 0.0, 80.0, 1.7, 1.4),  # 9600 baud
+    ],
+    ids=["quick", "5 % lost", "20 % lost", "reports", "disorder", "slow", "narrow"],
+)
+def test_a_quick_link_is_quick_and_a_slow_one_is_not_flooded(
+    kind: MockKind, faults: Faults, telemetry: float, seconds: float, up: float, back: float
+) -> None:
+    """`up` and `back`: messages of this end to upload and to read, by what there is to say."""
+    mock, peer = MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry), peer_of(kind)
     mock.tick(0.0)
-    for talk in (send_list(rows_for(kind, count)[:count], peer), read_list(peer)):
+    for talk, most in ((send_list(rows_for(kind, ROWS)[:ROWS], peer), up), (read_list(peer), back)):
         client, server = Counted(Script(talk)), Counted(mock)
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
-        took = simulate(*stations, faults, until=2000.0)
+        seconds -= simulate(*stations, faults, until=2000.0)
         assert client.outcome.verdict in ("accepted", "unknown")
         kinds = (MissionItemInt, MissionRequestInt)
-        ours, theirs = (sum(isinstance(m, kinds) for m in end.sent) for end in (client, server))
-        courses.append((took, ours, theirs))
-    return courses
-
-
-@BOTH
-def test_a_quick_link_is_quick_and_sends_little_more_than_is_needed(kind: MockKind) -> None:
-    for loss, seconds, messages in ((0.0, 3, 1), (0.05, 6, 1.3), (0.2, 30, 2)):
-        courses = there_and_back(kind, 300, Faults(loss=loss, seed=0))
-        assert sum(took for took, *_ in courses) < seconds
-        assert max(max(ours, theirs) for _, ours, theirs in courses) <= messages * 300
-    # 20 reports a second take two thirds of what this line can carry.
-    for took, ours, _ in there_and_back(kind, 100, Faults(latency=0.03, rate=2500.0), 20.0):
-        assert ours <= 1.3 * 100
-        assert took < 15
-
-
-@BOTH
-def test_a_slow_link_is_not_flooded(kind: MockKind) -> None:
-    for faults in (
-        Faults(latency=0.1),
-        Faults(latency=0.15, reordering=1.0, delay=0.1, seed=1),
-        Faults(latency=0.5),
-        Faults(latency=0.03, rate=5760.0),  # 57600 baud
-        Faults(latency=0.1, rate=960.0),  # 9600 baud
-    ):
-        (_, up, asked), (_, back, _) = there_and_back(kind, 100, faults)
-        # A late request ends a download of PX4, which begins anew.
-        late = kind == "px4" and faults.delay > 0
-        assert back <= (1.7 if late else 1.2) * 100, faults
-        # PX4 asks again after 0.25 s, ArduPilot after 1 s, and is answered each time.
-        assert up <= (2.1 if faults.latency >= 0.5 else 1.2) * asked, faults
-        lossy = Faults(loss=0.1, latency=faults.latency, rate=faults.rate, seed=1)
-        (_, up, asked), (_, back, _) = there_and_back(kind, 100, lossy)
-        assert back <= 1.4 * 100, faults
-        assert up <= 1.7 * max(asked, 100), faults
+        sent = sum(isinstance(each, kinds) for each in client.sent)
+        asked = sum(isinstance(each, MissionRequestInt) for each in server.sent)
+        assert sent <= most * max(asked, ROWS)
+    assert seconds > 0

@@ -70,29 +70,32 @@ def tcp() -> Iterator[Port]:
         yield port
 
 
-def test_a_datagram_that_was_cut_off_does_not_swallow_the_next(udp: Port) -> None:
-    peer = udp.peer()
-    for data in (packet_of(LONG)[:-9], packet_of(), packet_of(LONG)[:2], packet_of()):
-        peer.send(data)
+def test_datagrams_hold_packets_that_are_cut_anywhere(udp: Port) -> None:
+    """One that was cut off does not swallow the next; senders do not complete each other."""
+    whole, one, other = packet_of(LONG), udp.peer(), udp.peer()
+    for data in (whole[:-9], packet_of(), whole[:2], packet_of()):
+        one.send(data)
     assert udp.received() == [packet_of()] * 2
-
-
-def test_senders_do_not_complete_each_other(udp: Port) -> None:
-    whole = packet_of(LONG)
-    one, other = udp.peer(), udp.peer()
     one.send(whole[:20])
     other.send(packet_of())
     other.send(whole[20:])
     assert udp.received() == [packet_of()]
     one.send(whole[20:])
     assert udp.received() == [whole]
+    stream = b"".join(map(packet_of, (LONG, BEAT, LONG)))
+    for start in range(0, len(stream), 17):  # as a bridge to a serial line does
+        one.send(stream[start : start + 17])
+    assert udp.received() == [whole, packet_of(), whole]
 
 
-def test_a_bridge_may_cut_packets_anywhere(udp: Port) -> None:
-    stream, peer = b"".join(map(packet_of, (LONG, BEAT, LONG))), udp.peer()
-    for start in range(0, len(stream), 17):
-        peer.send(stream[start : start + 17])
-    assert udp.received() == [packet_of(LONG), packet_of(), packet_of(LONG)]
+def test_who_sends_without_end_is_read_a_burst_at_a_time(
+    udp: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.wire.transport._BURST", 10)
+    peer = udp.peer()
+    for _ in range(25):
+        peer.send(packet_of())
+    assert [len(udp.transport.read(0.05)) for _ in range(3)] == [10, 10, 5]
 
 
 def test_of_too_many_tcp_clients_the_first_are_served(tcp: Port) -> None:
@@ -149,13 +152,3 @@ def test_packets_come_out_however_a_stream_is_cut(parts: list[bytes], data: st.D
         (0, VEHICLE),
         (253, VEHICLE),
     }
-
-
-def test_who_sends_without_end_is_read_a_burst_at_a_time(
-    udp: Port, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("faao_mav.wire.transport._BURST", 10)
-    peer = udp.peer()
-    for _ in range(25):
-        peer.send(packet_of())
-    assert [len(udp.transport.read(0.05)) for _ in range(3)] == [10, 10, 5]
