@@ -15,7 +15,7 @@ from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import messages
 from faao_mav.wire.messages import Message
-from faao_mav.wire.parameters import value_in
+from faao_mav.wire.parameters import carried, value_in
 from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
 from faao_mav.wire.wire_items import wire_items
 
@@ -176,6 +176,10 @@ def test_parameters(kind: MockKind) -> None:
     assert desk.tell(messages.ParamRequestRead(VEHICLE, "", 999)) == []
     (changed,) = desk.tell(messages.ParamSet(VEHICLE, second.param_id, 7.0, 9))
     assert changed.param_value == 7.0
+    if kind == "px4":  # takes no other type than it has
+        assert desk.tell(messages.ParamSet(VEHICLE, "GF_ACTION", 3.0, 9)) == []
+        (answer,) = desk.tell(messages.ParamSet(VEHICLE, "GF_ACTION", carried(3, 6, vehicle), 6))
+        assert (value_in(answer, vehicle), answer.param_type) == (3, 6)
 
 
 def test_a_reboot_keeps_what_is_stored() -> None:

@@ -38,7 +38,7 @@ def mission_file(tmp_path: Path) -> Path:
 
 
 def test_upload_and_download(tmp_path: Path) -> None:
-    """What ArduPilot does not keep is told once for each field."""
+    """What ArduPilot does not keep is told once for each field; JSON is one object."""
     path, out = tmp_path / "m.waypoints", tmp_path / "back.plan"
     items = tuple(
         MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36 + k * 1e-4, 149.16, 20.0)
@@ -46,7 +46,9 @@ def test_upload_and_download(tmp_path: Path) -> None:
     )
     path.write_text(write_wpl(Mission(items, HOME)))
     with vehicle() as (to, _):
-        result = run("upload", path, "--to", to, "--system", 1)
+        result, as_json = (
+            run("upload", path, "--to", to, "--system", 1, *more) for more in ((), ("--json",))
+        )
         assert (result.exit_code, result.stderr) == (0, ""), result.output
         *told, kept, verified = result.stdout.splitlines()
         assert told == [
@@ -65,33 +67,29 @@ def test_upload_and_download(tmp_path: Path) -> None:
     assert json.loads(out.read_text())["mission"]["firmwareType"] == 3  # MAV_AUTOPILOT of ArduPilot
     for kept_item, item in zip(found.items, items, strict=True):
         assert (kept_item.x, kept_item.y, kept_item.z) == pytest.approx((item.x, item.y, item.z))
-
-
-def test_json_is_one_object(mission_file: Path) -> None:
-    with vehicle("px4") as (to, _):
-        result = run("upload", mission_file, "--to", to, "--json", "--system", 1)
-    assert (result.exit_code, result.stdout.count("\n")) == (0, 1)
-    data = json.loads(result.stdout)
-    assert (data["verified"], data["vehicle"]["autopilot"], data["problems"]) == (True, "px4", [])
+    data = json.loads(as_json.stdout)
+    assert as_json.stdout.count("\n") == 1
+    assert (data["verified"], data["vehicle"]["autopilot"]) == (True, "ardupilot")
     (mission,) = data["lists"]
-    assert (mission["list"], mission["items"], mission["verdict"]) == ("mission", 6, "verified")
-    assert mission["opaque_id"] > 0
-    item = MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36, 149.16, 20.0)
-    mission_file.write_text(write_wpl(Mission((item,), HOME)))
-    with vehicle() as (to, _):
-        result = run("upload", mission_file, "--to", to, "--json", "--system", 1)
-    lost = {"item": 0, "field": "param1", "sent": 2.5, "found": 2.0, "kind": "dropped"}
-    assert json.loads(result.stdout)["lists"][0]["differences"] == [lost]
+    assert (mission["list"], mission["items"], mission["verdict"]) == ("mission", 4, "verified")
+    lost_field = {"item": 0, "field": "param1", "sent": 2.5, "found": 2.0, "kind": "dropped"}
+    assert lost_field in mission["differences"]
 
 
-def test_a_refused_upload_is_status_1(mission_file: Path) -> None:
+def test_a_refused_upload_is_status_1(tmp_path: Path) -> None:
+    path = tmp_path / "m.waypoints"
+    path.write_text(write_wpl(a_mission(6)))
     with vehicle(refusals={(0, 3): MavResult.INVALID_PARAM7}) as (to, _):
-        result = run("upload", mission_file, "--to", to, "--system", 1)
+        result = run("upload", path, "--to", to, "--system", 1)
+        large = put(a_mission(700), to, system=1)
     assert result.exit_code == 1
     assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
     assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
     assert "not verified; do not fly it" in result.stderr
     assert "verified     " not in result.stdout
+    (problem,) = large.problems
+    assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
+    assert "The vehicle says: Only 655 items are supported" in problem
 
 
 def test_the_mock_autopilot_as_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,9 +124,9 @@ def test_the_mock_autopilot_as_a_command(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 class Reticent(MockAutopilot):
-    """It says nothing about what it holds beside its mission, or `part` of it."""
+    """It says nothing about what it holds of some `parts`."""
 
-    parts: tuple[MissionType, ...] = (MissionType.FENCE, MissionType.RALLY)
+    parts: tuple[MissionType, ...] = (MissionType.FENCE,)
 
     def _receive(self, envelope: Envelope, now: float) -> Any:
         message = envelope.message
@@ -136,46 +134,38 @@ class Reticent(MockAutopilot):
         return () if asked else super()._receive(envelope, now)
 
 
-@pytest.mark.parametrize("part", [MissionType.FENCE, MissionType.RALLY])
 def test_what_can_be_read_is_written_and_what_cannot_is_told(
-    part: MissionType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    hurry(monkeypatch)
-    held = a_mission(5, fence=FENCE, rally=RALLY)
-    outs = tmp_path / "m.plan", tmp_path / "m.waypoints"
-    with vehicle("px4", Reticent) as (source, mock):
-        mock.parts = (part,)
-        for each in MissionType:
-            mock.lists.replace(each, wire_items(held, each, vehicle_of("px4")))
-        results = [run("download", "--from", source, "--system", 1, "--out", out) for out in outs]
-    for out, result in zip(outs, results, strict=True):
-        assert result.exit_code == 1
-        assert f"{part.title} not read" in result.stdout
-        assert f"written      {out}" in result.stdout
-        assert f"{part.title}: not read: the vehicle stopped answering" in result.stderr
-        assert f"{out}: without the {part.title} that the vehicle may hold" in result.stderr
-        found = read_mission_file(out).mission
-        assert len(found.items) == 5
-        assert found.fence == (Fence() if part is MissionType.FENCE else FENCE)
-    assert "QGroundControl clears it there" not in result.stderr  # a text file has no such part
-    plan = read_mission_file(outs[0])
-    assert plan.mission.rally == (() if part is MissionType.RALLY else RALLY)
-    untold = f"m.plan: without the {part.title} that the vehicle may hold: not read from it"
-    assert [told.endswith(untold) for told in plan.warnings] == [True]
-
-
-def test_a_download_without_a_mission_writes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Python gets no part for the whole; without a mission nothing is written."""
     hurry(monkeypatch)
-    out = tmp_path / "m.plan"
-    with vehicle("px4", Reticent) as (to, mock):
-        with pytest.raises(LinkError, match="fence: not read"):  # Python gets no part for the whole
-            get(to, system=1)
+    held, plan, text = (
+        a_mission(5, fence=FENCE, rally=RALLY),
+        tmp_path / "m.plan",
+        tmp_path / "m.txt",
+    )
+    with vehicle("px4", Reticent) as (source, mock):
+        for each in MissionType:
+            mock.lists.replace(each, wire_items(held, each, vehicle_of("px4")))
+        asked = ("download", "--from", source, "--system", 1, "--out")
+        results = [run(*asked, out) for out in (plan, text)]
+        with pytest.raises(LinkError, match="fence: not read"):
+            get(source, system=1)
         mock.parts = (MissionType.MISSION,)
-        result = run("download", "--from", to, "--system", 1, "--out", out)
-        nobody = run("download", "--from", to, "--system", 9, "--out", out, "--timeout", 0.3)
-    assert (result.exit_code, nobody.exit_code) == (1, 1)
-    assert "mission: not read: the vehicle stopped answering" in result.stderr
-    assert "no heartbeat of the autopilot of system 9 within 0.3 s" in nobody.stderr
-    assert not out.exists()
+        nothing = run(*asked, tmp_path / "none.plan")
+    for out, result in zip((plan, text), results, strict=True):
+        assert result.exit_code == 1
+        assert "fence not read" in result.stdout
+        assert f"written      {out}" in result.stdout
+        assert "fence: not read: the vehicle stopped answering" in result.stderr
+        assert f"{out}: without the fence that the vehicle may hold" in result.stderr
+        found = read_mission_file(out).mission
+        assert (len(found.items), found.fence) == (5, Fence())
+    assert "QGroundControl clears it there" not in result.stderr  # a text file has no such part
+    read = read_mission_file(plan)
+    assert read.mission.rally == RALLY
+    untold = "m.plan: without the fence that the vehicle may hold: not read from it"
+    assert [told.endswith(untold) for told in read.warnings] == [True]
+    assert nothing.exit_code == 1
+    assert "mission: not read: the vehicle stopped answering" in nothing.stderr
+    assert not (tmp_path / "none.plan").exists()
