@@ -34,7 +34,7 @@ class Behaviour:
         denied: the MAV_RESULT of a mode that it does not enter, and with which it does not arm.
         returns_by_mode: the types of vehicle that change their mode when a mission has them return.
         parameters: what ground stations look for beside the parameters that the package knows.
-        numbers_lists: it tells a number for each list.
+        numbers_missions: it tells a number for each mission.
         silent_at_boot: it answers nothing about lists before it is ready.
         tells_no_place: it tells latitude and longitude 0 as long as it knows none; else nothing.
         armed_inside_only: it does not arm where home lies outside the fence.
@@ -50,7 +50,7 @@ class Behaviour:
     denied: int
     returns_by_mode: frozenset[str]
     parameters: Mapping[str, float] = field(default_factory=dict)
-    numbers_lists: bool = False
+    numbers_missions: bool = False
     silent_at_boot: bool = False
     tells_no_place: bool = False
     armed_inside_only: bool = False
@@ -121,7 +121,7 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
         no_mode=0,  # accepted, but nothing changes
         denied=1,  # temporarily rejected
         returns_by_mode=frozenset({"copter", "plane"}),
-        numbers_lists=True,
+        numbers_missions=True,
         silent_at_boot=True,
         infeasible=_px4_infeasible,
     ),
@@ -131,7 +131,7 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
 def behaviour_of(kind: MockKind, **changes: Any) -> Behaviour:
     """Return the behaviour of `kind`, with some fields changed.
 
-    >>> behaviour_of("px4", numbers_lists=False).family.name
+    >>> behaviour_of("px4", numbers_missions=False).family.name
     'PX4'
     """
     return replace(_BEHAVIOURS[kind], **changes)

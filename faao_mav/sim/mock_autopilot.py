@@ -200,8 +200,7 @@ class MockAutopilot(Machine[None]):
         state = 1 if total == 0 else 3 if self.flight.on_mission else 2
         if self.flight.on_mission and self._clock >= self.flight.aircraft.arrives:
             state = protocol.MISSION_COMPLETE
-        number = self.lists.number(MissionType.MISSION)
-        return messages.MissionCurrent(self._current, total, state, number)
+        return messages.MissionCurrent(self._current, total, state, self.lists.number)
 
     def _heartbeat(self) -> Message:
         state = MavState.ACTIVE if self.armed else MavState.STANDBY

@@ -87,10 +87,11 @@ class StoredLists:
         stored = self._dialect.stored(mission_item(item))
         return wire_item(stored, seq, current=seq == 0 and not self._dialect.home_row)
 
-    def number(self, part: MissionType) -> int:
-        """Return a number that tells this list from others, a checksum; 0: it has no numbers."""
-        checksum = zlib.crc32(repr(self._items[part]).encode())
-        return checksum if self._behaviour.numbers_lists else 0
+    @property
+    def number(self) -> int:
+        """A number that tells this mission from others, a checksum; 0: it has no numbers."""
+        checksum = zlib.crc32(repr(self._items[MissionType.MISSION]).encode())
+        return checksum if self._behaviour.numbers_missions else 0
 
     @property
     def deadline(self) -> float:
@@ -209,7 +210,7 @@ class StoredLists:
         if self._alone:
             sending = _Transfer(*whose, len(items), self._now, sending=True, items=items)
             self._transfers[None] = sending
-        return [messages.MissionCount(*whose, len(items), self.number(part))]
+        return [messages.MissionCount(*whose, len(items))]
 
     def _on_request(
         self, part: MissionType, seq: int, under_way: _Transfer | None, *, legacy: bool
@@ -254,8 +255,7 @@ class StoredLists:
         del self._transfers[self._slot(transfer.part)]
         whole = transfer.passed == transfer.count
         self._whole = (*transfer.whose, transfer.count) if whole else None
-        number = self.number(transfer.part) if result == MavResult.ACCEPTED else 0
-        return [messages.MissionAck(*transfer.whose, result, number)]
+        return [messages.MissionAck(*transfer.whose, result)]
 
     def _in_place(self, part: MissionType) -> bool:
         return not self._dialect.atomic and part is not MissionType.FENCE

@@ -31,8 +31,7 @@ _KINDS: dict[str, type[Message]] = {
 
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
-_BEYOND = ("opaque_id", "mission_id")
-"""Fields behind those that the dialects of pymavlink know, of 4 bytes."""
+_BEYOND = "mission_id"  # A field of 4 bytes behind those that the dialects of pymavlink know.
 
 
 class Framer:
@@ -151,9 +150,8 @@ class Codec:
             else:
                 numbers += [value] * max(length, 1)
         payload = kind.unpacker.pack(*numbers)
-        payload += b"".join(
-            values[name].to_bytes(4, "little") for name in _BEYOND if name in values
-        )
+        if _BEYOND in values:
+            payload += values[_BEYOND].to_bytes(4, "little")
         if self._signing is not None:
             self._mav.signing.timestamp = self._signing.next_tick()
         packet = self._dialect.MAVLink_message(kind.id, name)
@@ -196,9 +194,9 @@ def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
         params = (p.param1, p.param2, p.param3, p.param4)
         flags = (p.current, p.autocontinue)
         values["item"] = WireItem(p.command, p.frame, params, p.x, p.y, p.z, *flags)
-    payload = raw[10 : 10 + raw[1]] if raw[0] == _MAVLINK_2 else b""
-    for name in values.keys() & _BEYOND:
-        values[name] = int.from_bytes(payload[packet.unpacker.size :][:4], "little")
+    if _BEYOND in values and raw[0] == _MAVLINK_2:
+        payload = raw[10 : 10 + raw[1]]
+        values[_BEYOND] = int.from_bytes(payload[packet.unpacker.size :][:4], "little")
     return Envelope(sender_of(raw), kind(**values), origin)
 
 

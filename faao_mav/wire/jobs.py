@@ -17,7 +17,6 @@ from faao_mav.wire.transfer import (
     TENTATIVE,
     PartReport,
     Peer,
-    Verdict,
     read_list,
     send_list,
 )
@@ -26,6 +25,9 @@ from faao_mav.wire.wire_items import compare, home_items
 
 _ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
 """What a vehicle answers that has no such list at all."""
+
+_NOT_NOW = MavResult.DENIED, None
+"""The result, and the item, of an upload whose every announcement is denied."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,30 +107,36 @@ def upload_parts(
 
 
 def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> Talk[PartReport]:
+    rows = len(items[home_items(peer.vehicle, part) :])
     for attempt in range(1, ATTEMPTS + 1):
-        sent = yield from send_list(items, peer, part)
-        report = replace(sent, items=len(items[home_items(peer.vehicle, part) :]), attempts=attempt)
-        doubtful = sent.result in TENTATIVE
-        if sent.verdict in ("accepted", "unknown"):
-            read = yield from read_list(peer, part)
-            verdict: Verdict = "unread" if sent.verdict == "accepted" else "silent"
-            if read.verdict == "accepted":
-                differences = compare(items, read.found, part, peer.vehicle)
-                right = all(difference.kind != "wrong" for difference in differences)
-                # A doubtful refusal is about a duplicate if the list is right, else about an item.
-                verdict = "verified" if right else "refused" if doubtful else "different"
-                number = sent.opaque_id or read.opaque_id
-                report = replace(report, differences=differences, opaque_id=number)
-                if right and doubtful:
-                    report = replace(report, result=None)
-            report = replace(report, verdict=verdict, said=sent.said or read.said)
+        report = yield from send_list(items, peer, part)
+        if report.verdict in ("accepted", "unknown"):
+            report = _read_back(report, items, (yield from read_list(peer, part)), peer)
+        report = replace(report, items=rows, attempts=attempt)
         # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So may
         # DENIED, but not if it is said of every announcement of a whole attempt.
-        passes = doubtful and not (report.result == MavResult.DENIED and report.item is None)
-        refused = report.verdict == "refused" and not passes
-        if refused or report.verdict in ("verified", "armed"):
+        passes = report.result in TENTATIVE and (report.result, report.item) != _NOT_NOW
+        if report.verdict in ("verified", "armed") or (report.verdict == "refused" and not passes):
             break
     return report
+
+
+def _read_back(
+    sent: PartReport, items: tuple[WireItem, ...], read: PartReport, peer: Peer
+) -> PartReport:
+    """Return what became of `items` that were sent, by what was read of them."""
+    said = sent.said or read.said
+    if read.verdict != "accepted":
+        return replace(
+            sent, verdict="unread" if sent.verdict == "accepted" else "silent", said=said
+        )
+    differences = compare(items, read.found, sent.part, peer.vehicle)
+    told = replace(sent, differences=differences, said=said)
+    doubtful = sent.result in TENTATIVE
+    if any(each.kind == "wrong" for each in differences):
+        return replace(told, verdict="refused" if doubtful else "different")
+    # A doubtful refusal is about a duplicate if the list is right, else about an item.
+    return replace(told, verdict="verified", result=None if doubtful else sent.result)
 
 
 def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:
@@ -152,15 +160,17 @@ def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:
 
 def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> str:
     """Return in words why the `report` of a list of `mission` is not verified."""
-    home, part = home_items(peer.vehicle, report.part), report.part
+    home, part, holds = home_items(peer.vehicle, report.part), report.part, ""
     rows = report.items + home
+    if report.item is not None and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
+        holds = f". {what_is_left(peer)}"
     match report.verdict:
         case "different":
             wrong = [str(each) for each in report.differences if each.kind == "wrong"]
-            return _with_words(f"not what was sent: {listed(wrong)}", report)
+            text, holds = f"not what was sent: {listed(wrong)}", ""
         case "unread":
             text = "accepted, but it could not be read back; download it to see what is there"
-            return _with_words(f"{part.title}: {text}", report)
+            holds = ""
         case "armed":
             text = "the vehicle is armed: nothing more is written (--allow-armed allows it)"
         case "silent":
@@ -176,24 +186,12 @@ def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> s
                 with_home = " with home" if home else ""
                 text += f": {rows} rows{with_home}, and a vehicle like this holds about {sure}"
             elif report.item is not None:
-                text += f", at {_named(report.item - home, part, mission)}"
-    text = _with_words(f"{part.title}: {text}", report)
-    atomic = peer.vehicle is None or peer.vehicle.dialect.atomic
-    return text if atomic or report.item is None else f"{text}. {what_is_left(peer)}"
-
-
-def _with_words(text: str, report: PartReport) -> str:
-    """Return `text` with what the vehicle said."""
-    return f"{text}. The vehicle says: {'; '.join(report.said)}" if report.said else text
-
-
-def _named(item: int, part: MissionType, mission: Mission | None) -> str:
-    """Return what people call item `item` of a list, counted from behind the home row."""
-    if item < 0:
-        return "the home row"
-    if part is not MissionType.MISSION or mission is None or item >= len(mission.items):
-        return f"item {item}"
-    return f"item {item} (command {mission.items[item].command})"
+                number = report.item - home
+                text += f", at item {number}" if number >= 0 else ", at the home row"
+                if part is MissionType.MISSION and mission and 0 <= number < len(mission.items):
+                    text += f" (command {mission.items[number].command})"
+    said = f". The vehicle says: {'; '.join(report.said)}" if report.said else ""
+    return f"{part.title}: {text}{said}{holds}"
 
 
 def what_is_left(peer: Peer) -> str:

@@ -3,8 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
 from faao_mav.wire.messages import CommandLong, Envelope, M, Message, Timesync
 from faao_mav.wire.protocol import Address, MavCommand
@@ -18,15 +17,12 @@ AT_ONCE = -math.inf
 SILENCE = 9.0
 """Seconds that a transfer may get no further: PX4 asks again for 5 s, ArduPilot for 8 s."""
 
-_FIRST, SLOWEST = 0.25, 1.5
-"""Seconds after which a question is put again while it is not known how long answers take, and at
-the latest: the guide's."""
+_QUICKEST, _FIRST, SLOWEST = 0.02, 0.25, 1.5
+"""Seconds after which a question is put again: at the earliest, as the main loop of the slowest
+vehicle (ArduPlane) turns 50 times a second; while it is not known how long answers take, and at the
+latest, by the guide."""
 
-_QUICKEST, _LONGEST = 0.02, 0.5
-"""Seconds after which it is put again at the earliest: vehicles answer in the turns of their main
-loop, of which the slowest (ArduPlane's) has 50 a second; and at the latest on a quick link: chosen.
-"""
-
+_LONGEST = 0.5  # Seconds after which it is put again at the latest on a quick link; chosen.
 _GROWTH = 1.25  # By how much the wait grows with each question that has to be put again; chosen.
 
 
@@ -35,8 +31,8 @@ class Machine(ABC, Generic[T]):
 
     It is told the time in seconds and what arrived, and answers with what is to be sent. Whoever
     runs it calls `start` once, then `on` for each message and `tick` at `deadline`, until there is
-    an `outcome`; `cancel` ends it early. What derives from it gives `start`, `_receive` and
-    `_time_out`, and sets `_due`, the time of the next `_time_out`, and in the end `outcome`.
+    an `outcome`; `cancel` ends it early, `hang_up` where nobody can be told any more. What derives
+    from it sets `_due`, the time of the next `_time_out`, and in the end `outcome`.
     """
 
     def __init__(self) -> None:
@@ -169,13 +165,12 @@ class Pace:
         self.wait = min(max(self.mean + 4 * self._deviation, _QUICKEST), SLOWEST)
 
 
-@dataclass(slots=True)
-class _Question:
+class _Question(NamedTuple):
     """What is said when it is late; when it was put last, s, and how often."""
 
-    again: tuple[Message, ...] = ()
-    sent: float = 0.0
-    times: int = 0
+    again: tuple[Message, ...]
+    sent: float
+    times: int
 
 
 class Questions(Generic[K]):
@@ -187,7 +182,7 @@ class Questions(Generic[K]):
     def __init__(self, line: Script[Any], pace: Pace, silence: float) -> None:
         self._line, self.pace, self._silence = line, pace, silence
         self.asked: dict[K, _Question] = {}
-        self.until = line.now + silence
+        self.further()
 
     @property
     def over(self) -> bool:
@@ -200,9 +195,7 @@ class Questions(Generic[K]):
 
     def put(self, key: K, *messages: Message, again: tuple[Message, ...] = ()) -> None:
         """Put a question, or one under way once more; `again` is said instead once it is late."""
-        question = self.asked.setdefault(key, _Question())
-        question.again, question.sent = again or messages, self._line.now
-        question.times += 1
+        self.asked[key] = _Question(again or messages, self._line.now, self.times(key) + 1)
         self._line.say(*messages)
 
     def times(self, key: K) -> int:

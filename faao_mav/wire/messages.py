@@ -59,7 +59,6 @@ class MissionCount(ListMessage):
     """MISSION_COUNT: so many items are to come, or are there."""
 
     count: int
-    opaque_id: int = 0
 
 
 class MissionRequestInt(ListMessage):
@@ -79,7 +78,6 @@ class MissionAck(ListMessage):
     """MISSION_ACK; `type` is a MAV_MISSION_RESULT."""
 
     type: int
-    opaque_id: int = 0
 
 
 class MissionRequestList(ListMessage): ...

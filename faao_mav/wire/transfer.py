@@ -87,8 +87,7 @@ class PartReport:
     it is not; "unread": accepted, but could not be read back.
 
     `item` is the number of the item last asked for, `found` what was downloaded, `said` the
-    vehicle's own words, `opaque_id` its number for the list, 0 for none. `items` are those sent,
-    without the home item; `attempts` counts uploads.
+    vehicle's own words. `items` are those sent, without the home item; `attempts` counts uploads.
     """
 
     part: MissionType
@@ -97,7 +96,6 @@ class PartReport:
     item: int | None = None
     found: tuple[WireItem, ...] = ()
     said: tuple[str, ...] = ()
-    opaque_id: int = 0
     items: int = 0
     attempts: int = 1
     differences: tuple[Difference, ...] = ()
@@ -148,8 +146,11 @@ class _Exchange(Questions[int]):
         while not self.over:
             heard = yield from self.hear()
             message = heard and heard.said(self._peer.address, ListMessage)
-            about_it = message and message.mission_type == self._part
-            if message and about_it and self._peer.own.takes(message.target):
+            if (
+                message
+                and message.mission_type == self._part
+                and self._peer.own.takes(message.target)
+            ):
                 return message
         return None
 
@@ -184,10 +185,12 @@ class _Exchange(Questions[int]):
         result = result or self.doubted
         return self.end("silent" if result is None else "refused", result)
 
-    def end(self, verdict: Verdict, result: int | None = None, **more: Any) -> PartReport:
+    def end(
+        self, verdict: Verdict, result: int | None = None, found: tuple[WireItem, ...] = ()
+    ) -> PartReport:
         """Return how it ended."""
         said = tuple(dict.fromkeys(self._texts))
-        return PartReport(self._part, verdict, result, self.item, said=said, **more)
+        return PartReport(self._part, verdict, result, self.item, found, said)
 
 
 def send_list(
@@ -244,10 +247,10 @@ def send_list(
                     exchange.further()
                 current, furthest, exchange.doubted = seq, max(furthest, seq), None
                 send(seq)
-            case MissionAck(type=MavResult.ACCEPTED, opaque_id=number):
+            case MissionAck(type=MavResult.ACCEPTED):
                 # Before the last item was asked for it can only be about something else.
                 if furthest == last:
-                    return exchange.end("accepted", MavResult.ACCEPTED, opaque_id=number)
+                    return exchange.end("accepted", MavResult.ACCEPTED)
             case MissionAck(type=MavResult.INVALID_SEQUENCE):
                 if exchange.times(current) > 1 and current + 1 < last:
                     exchange.answer(current)
@@ -281,7 +284,7 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
     line = yield AT_ONCE
     exchange, wide = _Exchange(line, peer, part, writes=False), peer.manners.any_request_order
     for _ in range(ATTEMPTS):
-        items, count, number, following = dict[int, WireItem](), -1, 0, 0
+        items, count, following = dict[int, WireItem](), -1, 0
         exchange.asked.clear()
         exchange.further()
         exchange.put(_OPENING, MissionRequestList(peer.address, part))
@@ -291,7 +294,7 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
                 case None:
                     break
                 case MissionCount() as told if exchange.answer(_OPENING):
-                    count, number = told.count, told.opaque_id
+                    count = told.count
                 case MissionItemInt(seq=seq, item=item) if exchange.answer(seq):
                     items[seq] = item
                 case MissionAck(type=result) if result in _OF_UPLOADS:
@@ -310,7 +313,6 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
         else:
             ack = MissionAck(peer.address, part, MavResult.ACCEPTED)
             line.say(*[ack] * peer.manners.final_acks)
-            found = tuple(items[seq] for seq in range(count))
-            return exchange.end("accepted", found=found, opaque_id=number)
+            return exchange.end("accepted", None, tuple(items[seq] for seq in range(count)))
         peer.late = 0.0 if wide else max(2 * peer.late, _LATE)
     return exchange.stop()

@@ -145,12 +145,10 @@ def test_which_items_are_refused() -> None:
         assert upload(desk_for(prescribed), rows) == [MavResult.INVALID_PARAM3]
 
 
-def test_numbers_tell_px4_lists_apart() -> None:
-    desk = desk_for("px4")
-    numbers = []
+def test_numbers_tell_px4_missions_apart() -> None:
+    desk, numbers = desk_for("px4"), []
     for shift in (0.0, 0.1, 0.0):
         upload(desk, rows_for("px4", 3, shift))
-        (found,) = desk.tell(messages.MissionRequestList(VEHICLE, 0))
-        desk.tell(messages.MissionAck(VEHICLE, 0, MavResult.ACCEPTED))
-        numbers.append(found.opaque_id)
+        (told,) = [m for m in desk.wait(1.0) if isinstance(m, messages.MissionCurrent)]
+        numbers.append(told.mission_id)
     assert numbers[0] == numbers[2] != numbers[1]
