@@ -35,11 +35,9 @@ _STEP, _LONGEST = 0.05, 60.0
 """Seconds between two steps towards a setpoint, and the longest that is flown at once: after a
 longer silence it flies on from there. Chosen."""
 
-_STIFFNESS = 1.5
-"""Of how it corrects an error, 1/s, damped critically; chosen: as slow as those simulated."""
-
-_PUSH = 5.0
-"""The greatest acceleration towards a setpoint, m/s²; chosen: a lean of 27 degrees."""
+_STIFFNESS, _PUSH = 1.5, 5.0
+"""How it corrects an error, 1/s, damped critically, and its greatest acceleration towards a
+setpoint, m/s²; chosen: as slow as those simulated, and a lean of 27 degrees."""
 
 _GROUND = 0.5
 """Metres above home below which it stands on the ground; chosen."""
@@ -109,20 +107,18 @@ class Follower:
     def at(self, now: float) -> Posture:
         """Return where it is, and how it moves."""
         if self.aim is None:
-            self._play_until(now)
+            self._time, (self._p, before) = now, (self._played(t) for t in (now, now - _STEP))
+            self._v = (self._p - before) / _STEP
+            k = int(np.searchsorted(self._t, now, side="right")) - 1
+            self._item = int(self._items[max(k, 0)])
         else:
             self._time = max(self._time, now - _LONGEST)
             while self._time < now:
                 self._step_to(self.aim, min(_STEP, now - self._time))
         return Posture(self._p, self._v, self._item)
 
-    def _play_until(self, now: float) -> None:
-        k = max(int(np.searchsorted(self._t, now, side="right")) - 1, 0)
-        self._time, self._item = now, int(self._items[k])
-        self._p, self._v = self._places[k], np.zeros(3)
-        if self._t[k] <= now and k + 1 < len(self._t):
-            self._v = (self._places[k + 1] - self._p) / (self._t[k + 1] - self._t[k])
-            self._p = self._p + self._v * (now - self._t[k])
+    def _played(self, now: float) -> Real:
+        return np.array([np.interp(now, self._t, each) for each in self._places.T])
 
     def _step_to(self, aim: Real, step: float) -> None:
         self._time += step
@@ -131,12 +127,15 @@ class Follower:
             since = self._time - self._since
             p, v = p + v * since + a * since**2 / 2, v + a * since
         a = a + 2 * _STIFFNESS * (v - self._v) + _STIFFNESS**2 * (p - self._p)
-        a = a * min(1.0, _PUSH / max(float(np.linalg.norm(a)), 1e-9))
-        through_air = self._v + a * step - self._wind
-        through_air *= min(1.0, self._airspeed / max(float(np.linalg.norm(through_air)), 1e-9))
-        before, self._v = self._v, through_air + self._wind
+        through_air = self._v + _within(a, _PUSH) * step - self._wind
+        before, self._v = self._v, _within(through_air, self._airspeed) + self._wind
         self._p = self._p + (before + self._v) / 2 * step
         self._p[2] = max(self._p[2], 0.0)
+
+
+def _within(vector: Real, most: float) -> Real:
+    """Return `vector`, shortened to the length `most` where it is longer."""
+    return vector * min(1.0, most / max(float(np.linalg.norm(vector)), 1e-9))
 
 
 class Flight:
@@ -207,20 +206,18 @@ class Flight:
             self._since = now - self._begun
         self.on_mission = False
         vehicle, (east, north, up) = self.vehicle, self.aircraft.at(now).position
-        legs = list[tuple[Real, float]]()
-        if not self.aircraft.flies(now) or action == "hold":
-            self.aircraft.go(now)
-            return
-        if action == "return":
-            high = vehicle.returns_at(up)
-            legs.append((np.array([east, north, high]), vehicle.value("climb_speed")))
-            east, north, up = 0.0, 0.0, high
-            legs.append((np.array([east, north, up]), vehicle.value("cruise_speed")))
-        if action != "return" or self._type.hovers:
-            low = up if action == "sink" else min(up, LANDING_HEIGHT)
-            legs.append((np.array([east, north, low]), vehicle.value("descent_speed")))
-            legs.append((np.array([east, north, 0.0]), vehicle.landing_speed))
-        self.aircraft.go(now, *legs)
+        legs = list[tuple[float, float, float, float]]()  # to where, and how fast
+        if self.aircraft.flies(now) and action != "hold":
+            if action == "return":
+                high = vehicle.returns_at(up)
+                legs += [(east, north, high, vehicle.value("climb_speed"))]
+                east, north, up = 0.0, 0.0, high
+                legs += [(east, north, up, vehicle.value("cruise_speed"))]
+            if action != "return" or self._type.hovers:
+                low = up if action == "sink" else min(up, LANDING_HEIGHT)
+                legs += [(east, north, low, vehicle.value("descent_speed"))]
+                legs += [(east, north, 0.0, vehicle.landing_speed)]
+        self.aircraft.go(now, *((np.array(place), speed) for *place, speed in legs))
 
     # ---- the mission and the fence
 

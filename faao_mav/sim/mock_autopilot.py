@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -214,13 +215,12 @@ class MockAutopilot(Machine[None]):
         self._now = now
         sender, message = envelope.sender, envelope.message
         match message:
-            case messages.Timesync(tc1=asked, ts1=theirs):
-                here = int(self._clock * 1e9) + 1
-                return [messages.Timesync(here, theirs)] if asked == 0 else ()
+            case messages.Timesync(tc1=0, ts1=theirs):
+                return [messages.Timesync(int(self._clock * 1e9) + 1, theirs)]
             case messages.SetMode(target_system=system):
                 target = Address(system, 0)
-            case messages.Addressed():
-                target = message.target
+            case messages.Addressed(target=target):
+                pass
             case _:
                 return ()
         # PX4 takes for its own what is sent to its mission planner.
@@ -315,36 +315,34 @@ class MockAutopilot(Machine[None]):
             return "Calibrating"
         if self.mode in self.flight.modes.not_to_arm_in:
             return "Mode not armable"
-        try:
+        with suppress(InputError):  # peers store what they like
             fence = self.mission().fence
-        except InputError:  # peers store what they like
-            return ""
-        outside = self.behaviour.armed_inside_only and self.flight.is_outside(fence, np.zeros(3))
-        return "Vehicle breaching Polygon fence" if outside else ""
+            if self.behaviour.armed_inside_only and self.flight.is_outside(fence, np.zeros(3)):
+                return "Vehicle breaching Polygon fence"
+        return ""
 
     def _set_mode(self, mode: int) -> int:
         modes, clock = self.flight.modes, self._clock
-        if mode == modes.mission and self._problem():
+        if mode == modes.mission and self._flyable() is None:
             return self.behaviour.denied
         if mode == modes.guided and not self.flight.accepts_guided(clock):
             return self.behaviour.denied
         self.flight.enter(mode, clock)
         return self._begin() if mode == modes.mission else _ACCEPTED
 
-    def _problem(self) -> str:
-        """Return why what is stored cannot be flown, "" if it can."""
-        try:
+    def _flyable(self) -> Mission | None:
+        """Return what is stored, None if it cannot be flown: peers store what they like."""
+        with suppress(InputError):
             mission = self.mission()
-        except InputError as error:  # peers store what they like
-            return str(error)
-        return self.behaviour.infeasible(mission) if mission.items else "no mission"
+            if mission.items and not self.behaviour.infeasible(mission):
+                return replace(mission, home=self.home)
+        return None
 
     def _begin(self) -> int:
         """Fly the mission, once armed and told to; not a second time."""
-        if self._problem():
-            return _DENIED
-        mission = replace(self.mission(), home=self.home)
-        return _ACCEPTED if self.flight.begin(mission, self._clock) else _DENIED
+        mission = self._flyable()
+        begun = mission is not None and self.flight.begin(mission, self._clock)
+        return _ACCEPTED if begun else _DENIED
 
 
 def _fitted(value: float, bits: int) -> int:

@@ -19,16 +19,8 @@ from faao_mav.cli.main import app
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.sim import MockAutopilot, MockKind
-from faao_mav.wire import upload
+from faao_mav.wire import messages, upload
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.messages import (
-    Envelope,
-    Message,
-    MissionAck,
-    MissionItemInt,
-    Statustext,
-    WireItem,
-)
 from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
 from faao_mav.wire.wire_items import mission_of
 
@@ -37,8 +29,8 @@ NAN, INF = math.nan, math.inf
 
 def row(
     command: int, z: float = 30.0, x: int = -353_600_000, y: int = 1_491_600_000, p: float = 0.0
-) -> WireItem:
-    return WireItem(command, 3, (p, 0.0, 0.0, 0.0), x, y, z)
+) -> messages.WireItem:
+    return messages.WireItem(command, 3, (p, 0.0, 0.0, 0.0), x, y, z)
 
 
 def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded() -> None:
@@ -59,11 +51,11 @@ class _Liar(MockAutopilot):
 
     text = "no\x1b[2J\r\nverified     read back and compared, 1.3 s\n\x07"
 
-    def _receive(self, envelope: Envelope, now: float) -> Any:
+    def _receive(self, envelope: messages.Envelope, now: float) -> Any:
         answers = super()._receive(envelope, now)
-        if isinstance(envelope.message, MissionItemInt):
-            refusal = MissionAck(GROUND_STATION, MissionType.MISSION, MavResult.INVALID)
-            return [Statustext(2, self.text), refusal]
+        if isinstance(envelope.message, messages.MissionItemInt):
+            refusal = messages.MissionAck(GROUND_STATION, MissionType.MISSION, MavResult.INVALID)
+            return [messages.Statustext(2, self.text), refusal]
         return answers
 
 
@@ -87,15 +79,15 @@ def command(number: signal.Signals, arguments: list[str], **pipes: int) -> "subp
 
 
 def test_an_upload_that_is_ended_from_outside_is_cancelled(tmp_path: Path) -> None:
-    path, cancelled = tmp_path / "m.waypoints", list[MissionAck]()
+    path, cancelled = tmp_path / "m.waypoints", list[messages.MissionAck]()
     path.write_text(write_wpl(a_mission(9, fence=FENCE)))
 
     class Ended(MockAutopilot):
-        def _receive(self, envelope: Envelope, now: float) -> Any:
+        def _receive(self, envelope: messages.Envelope, now: float) -> Any:
             message = envelope.message
-            if isinstance(message, MissionAck):
+            if isinstance(message, messages.MissionAck):
                 cancelled.append(message)
-            if isinstance(message, MissionItemInt) and message.seq >= 2:
+            if isinstance(message, messages.MissionItemInt) and message.seq >= 2:
                 client.send_signal(signal.SIGTERM)
                 return ()
             return super()._receive(envelope, now)
@@ -145,10 +137,10 @@ def test_a_link_that_breaks_in_an_upload_says_what_is_left(
     waiting = [(theirs.pack(message), "") for message in mock.start(0.0)]
 
     def says(data: bytes | None) -> list[tuple[bytes, str]]:
-        answers = list[Message]()
+        answers = list[messages.Message]()
         for packet in theirs.parse(data or b""):
             assert packet.envelope is not None
-            if isinstance(packet.envelope.message, MissionItemInt):
+            if isinstance(packet.envelope.message, messages.MissionItemInt):
                 raise LinkError("/dev/ttyACM0: the device is gone")
             answers += mock.on(packet.envelope, 1.0)
         return [(theirs.pack(answer), "") for answer in answers]

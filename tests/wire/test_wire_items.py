@@ -12,20 +12,8 @@ from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, vehicle_of
 from faao_mav.errors import InputError
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.mission.fence import RallyPoint
+from faao_mav.wire import messages
 from faao_mav.wire.codec import Codec, Packet
-from faao_mav.wire.messages import (
-    CommandLong,
-    Heartbeat,
-    Message,
-    MissionAck,
-    MissionCount,
-    MissionCurrent,
-    MissionItemInt,
-    MissionRequest,
-    MissionRequestInt,
-    ParamValue,
-    Statustext,
-)
 from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.wire_items import mission_of, wire_items
 
@@ -39,7 +27,7 @@ def there_and_back(mission: Mission, firmware: str) -> Mission:
         part: [
             message_of(found).item
             for row in wire_items(mission, part, vehicle)
-            for found in codec.parse(codec.pack(MissionItemInt(VEHICLE, part, 0, row)))
+            for found in codec.parse(codec.pack(messages.MissionItemInt(VEHICLE, part, 0, row)))
         ]
         for part in MissionType
     }
@@ -110,17 +98,17 @@ def test_rows_hold_all_of_an_item_of_a_fence_and_of_a_rally_point(
     assert (found.items, found.fence, found.rally) == (mission.items, fence, RALLY)
 
 
-MESSAGES: list[Message] = [
-    Heartbeat(2, 3, 128, 3, 4),
-    Statustext(4, "Only 655 items are supported"),
-    MissionCount(GROUND_STATION, 0, 700),
-    MissionCurrent(5, 38, 3, 0xDEADBEEF),
-    MissionCurrent(5, 38, 3),
-    MissionAck(GROUND_STATION, 2, 4),
-    MissionRequestInt(GROUND_STATION, 1, 12),
-    MissionRequest(GROUND_STATION, 1, 12),
-    CommandLong(VEHICLE, 400, 0, 1.0),
-    ParamValue("WPNAV_SPEED", 1000.0, 9, 12, 3),
+MESSAGES: list[messages.Message] = [
+    messages.Heartbeat(2, 3, 128, 3, 4),
+    messages.Statustext(4, "Only 655 items are supported"),
+    messages.MissionCount(GROUND_STATION, 0, 700),
+    messages.MissionCurrent(5, 38, 3, 0xDEADBEEF),
+    messages.MissionCurrent(5, 38, 3),
+    messages.MissionAck(GROUND_STATION, 2, 4),
+    messages.MissionRequestInt(GROUND_STATION, 1, 12),
+    messages.MissionRequest(GROUND_STATION, 1, 12),
+    messages.CommandLong(VEHICLE, 400, 0, 1.0),
+    messages.ParamValue("WPNAV_SPEED", 1000.0, 9, 12, 3),
 ]
 
 
