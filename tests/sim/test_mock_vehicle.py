@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import pytest
 from stations import HOME, VEHICLE, Desk, a_mission, vehicle_of
@@ -211,13 +211,13 @@ RTL, HOLD = 6, 4 << 16 | 3 << 24
 
 
 @pytest.mark.parametrize(
-    ("kind", "parameters", "farthest", "end", "modes", "told"),
+    ("kind", "parameters", "farthest", "end", "modes"),
     [
-        ("ardupilot", {"FENCE_ENABLE": 1}, 102, (0, 0), [0, 3, RTL], True),
-        ("ardupilot", {}, 222, (0, 0), [0, 3], False),
-        ("px4", {}, 102, (102, 20), [HOLD, AUTO["px4"], HOLD], True),
-        ("px4", {"GF_ACTION": 3}, 102, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)], True),
-        ("px4", {"GF_ACTION": 1}, 222, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)], True),
+        ("ardupilot", {"FENCE_ENABLE": 1}, 102, (0, 0), [0, 3, RTL]),
+        ("ardupilot", {}, 222, (0, 0), [0, 3]),
+        ("px4", {}, 102, (102, 20), [HOLD, AUTO["px4"], HOLD]),
+        ("px4", {"GF_ACTION": 3}, 102, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)]),
+        ("px4", {"GF_ACTION": 1}, 222, (0, 0), [HOLD, AUTO["px4"], px4_mode(4, 5)]),
     ],
 )
 def test_at_its_fence_it_does_what_its_parameters_say(
@@ -226,7 +226,6 @@ def test_at_its_fence_it_does_what_its_parameters_say(
     farthest: float,
     end: tuple[float, float],
     modes: list[int],
-    told: bool,
 ) -> None:
     """ArduPilot returns, PX4 holds by default; where it is not to be kept it flies on."""
     desk = desk_for(kind, OUT, parameters=parameters)
@@ -239,15 +238,10 @@ def test_at_its_fence_it_does_what_its_parameters_say(
     assert desk.machine.armed == (end[1] > 0)
     changes = [beat.custom_mode for beat in only(desk.sent, messages.Heartbeat)]
     assert [m for m, before in zip(changes, [None, *changes], strict=False) if m != before] == modes
+    told = kind == "px4" or bool(parameters)
     assert told == any("fence" in text.text for text in only(desk.sent, messages.Statustext))
-
-
-def test_ardupilot_does_not_arm_outside_its_fence() -> None:
+    # ArduPilot does not arm outside.
     away = Fence(circles=(Circle((HOME.latitude + 0.01, HOME.longitude), 100.0, inclusion=True),))
-    for kind, parameters, expected in (
-        ("ardupilot", {"FENCE_ENABLE": 1.0}, 4),
-        ("ardupilot", {}, 0),
-        ("px4", {}, 0),
-    ):
-        desk = desk_for(cast(MockKind, kind), replace(OUT, fence=away), parameters=parameters)
-        assert result(desk.tell(command(400, 1))) == expected
+    desk = desk_for(kind, replace(OUT, fence=away), parameters=parameters)
+    keeps = kind == "ardupilot" and bool(parameters)
+    assert result(desk.tell(command(400, 1))) == (4 if keeps else 0)

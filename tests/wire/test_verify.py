@@ -3,9 +3,8 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
-import pytest
 from stations import FENCE, HOME, RALLY, rows_for, vehicle_of
 
 from faao_mav.mission import Mission, MissionItem
@@ -38,9 +37,8 @@ def changed(rows: Sequence[WireItem], index: int, **changes: Any) -> tuple[WireI
     return (*rows[:index], dataclasses.replace(rows[index], **changes), *rows[index + 1 :])
 
 
-@pytest.mark.parametrize(
-    ("firmwares", "item", "change", "expected"),
-    [
+def test_what_is_read_back_otherwise() -> None:
+    for firmwares, item, change, expected in (
         # What storage loses is told, and no error.
         ("ardupilot", WAYPOINT, {"params": (2.0, 0.0, 0.0, 0.0)}, "d d d d"),
         ("px4", WAYPOINT, {"params": (2.7, 5.0, 0.0, 30.0)}, "d"),
@@ -64,18 +62,14 @@ def changed(rows: Sequence[WireItem], index: int, **changes: Any) -> tuple[WireI
         # Of commands that are not known numbers may be lost, but not replaced.
         ("ardupilot", GRIPPER, {"frame": 0, "params": (9.0, 1500.0, 0.0, 0.0)}, "d"),
         ("ardupilot", GRIPPER, {"frame": 0, "params": (9.0, 1600.0, 2.0, 0.0)}, "w"),
-    ],
-)
-def test_what_is_read_back_otherwise(
-    firmwares: str, item: MissionItem, change: dict[str, Any], expected: str
-) -> None:
-    for firmware in firmwares.split():
-        sent = rows_with(firmware, item)
-        found = kinds(sent, changed(sent, -1, **change), firmware).values()
-        if expected == "w":
-            assert "wrong" in found
-        else:
-            assert [kind[0] for kind in found] == expected.split()
+    ):
+        for firmware in firmwares.split():
+            sent, given = rows_with(firmware, item), cast(dict[str, Any], change)
+            found = kinds(sent, changed(sent, -1, **given), firmware).values()
+            if expected == "w":
+                assert "wrong" in found, (item, change)
+            else:
+                assert [kind[0] for kind in found] == expected.split(), (item, change)
 
 
 def test_missing_and_surplus_items() -> None:
