@@ -230,7 +230,7 @@ class StoredLists:
         return [messages.MissionItemInt(*whose, seq, items[seq])]
 
     def _on_ack(self, part: MissionType, result: int, under_way: _Transfer) -> list[Message]:
-        if result == MavResult.UNSUPPORTED and not under_way.sending:
+        if result == MavResult.UNSUPPORTED and not under_way.sending:  # so says MAVSDK
             self._legacy = not self._legacy
             return self._ask(under_way)
         if part == under_way.part if under_way.sending else result == MavResult.OPERATION_CANCELLED:

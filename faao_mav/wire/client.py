@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypedDict, Unpack
 
-from faao_mav.autopilot import families
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
@@ -106,7 +105,7 @@ def upload(
     if not mission.items:
         raise InputError("upload: the mission has no items")
     check_settable(parameters or (), "parameters")
-    with Session(connection, knocks=True, **options) as session:
+    with Session(connection, **options) as session:
         found, peer = session.found, session.peer
         if found.armed and not allow_armed:
             raise LinkError(
@@ -177,7 +176,7 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     Raises `LinkError` if there is no such vehicle or its mission does not come whole; a vehicle
     that has no fence or rally points at all is one that has none stored.
     """
-    with Session(connection, knocks=True, **options) as session:
+    with Session(connection, **options) as session:
         peer = session.peer
 
         def read() -> Talk[tuple[Lists, HomePosition | None]]:
@@ -204,14 +203,9 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
 
 
 class Session(WireLink):
-    """A link to the one vehicle that has been found; to be used in a `with` statement.
+    """A link to the one vehicle that has been found; to be used in a `with` statement."""
 
-    With `knocks` a vehicle is woken up that waits for a heartbeat on a serial line: see `discover`.
-    """
-
-    def __init__(
-        self, connection: str, *, knocks: bool = False, **options: Unpack[LinkOptions]
-    ) -> None:
+    def __init__(self, connection: str, **options: Unpack[LinkOptions]) -> None:
         self.started = time.monotonic()
         self._key_file = options.get("signing_key")
         self._signing = None if self._key_file is None else read_signing(self._key_file)
@@ -225,7 +219,7 @@ class Session(WireLink):
             observe=options.get("observe") or (lambda *_: None),
         )
         try:
-            self.found = self._found(connection, knocks, options)
+            self.found = self._found(connection, options)
             self.bind(self.found.address, *self.found.origins)
             self._check_alive(connection)
         except BaseException:
@@ -241,10 +235,10 @@ class Session(WireLink):
         if self.log is not None and self.log.failure is not None:
             self._note(self.log.failure)
 
-    def _found(self, connection: str, knocks: bool, options: LinkOptions) -> FoundVehicle:
+    def _found(self, connection: str, options: LinkOptions) -> FoundVehicle:
         """Return the vehicle; raises `LinkError`."""
         which, wait = (options.get("system"), options.get("component")), options.get("wait", 10.0)
-        knocks = knocks and parse_connection(connection).kind == "serial"
+        knocks = parse_connection(connection).kind == "serial"
         heard = self.run(discover(*which, patience=wait, listens=self.listens, knocks=knocks))
         for verdict, text in _PASSED_OVER.items():
             if self._signing and not heard.vehicles and verdict in self.codec.heard:
@@ -253,25 +247,13 @@ class Session(WireLink):
         return choose(heard, connection, *which, wait)
 
     def _check_alive(self, connection: str) -> None:
-        """Raise `LinkError` for a recording, and for a vehicle that does not read MAVLink 2."""
-        old = self.found.address not in self.codec.modern
-        if self._signing is None and not old:
+        """Raise `LinkError` for a recording of a signed session."""
+        if self._signing is None or self.run(ask_alive(self.found.address, secrets.randbits(62))):
             return
-        if self.run(ask_alive(self.found.address, secrets.randbits(62))):
-            return
-        why = (
-            "no answer to a question that was never asked before (TIMESYNC): is the vehicle there, "
-            "or a recording of it?"
+        raise LinkError(
+            f"{connection}: {self.found}: no answer to a question that was never asked before "
+            "(TIMESYNC): is the vehicle there, or a recording of it?"
         )
-        if old:
-            ports = [
-                f"{each.name}: {each.mavlink_2}" for each in families().values() if each.mavlink_2
-            ]
-            why = (
-                "it speaks MAVLink 1 only, and does not answer MAVLink 2: set its port to MAVLink "
-                f"2 ({'; '.join(ports)})"
-            )
-        raise LinkError(f"{connection}: {self.found}: {why}")
 
     def not_read(self, report: PartReport) -> str:
         """Return in words why a list was not read."""
@@ -290,4 +272,7 @@ class Session(WireLink):
         if self._signing is None and "signed" in self.codec.heard:
             return "; it signs its packets, and may want them signed: --signing-key"
         family = self.found.family
+        if self.found.address not in self.codec.modern:
+            where = f": {family.mavlink_2}" if family and family.mavlink_2 else ""
+            return f"; it speaks MAVLink 1 only: set its port to MAVLink 2{where}"
         return f"; {family.only_one_station}" if family and family.only_one_station else ""

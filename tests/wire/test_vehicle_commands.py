@@ -142,7 +142,7 @@ def test_what_can_be_read_is_written_and_what_cannot_is_told(
     held, plan, text = (
         a_mission(5, fence=FENCE, rally=RALLY),
         tmp_path / "m.plan",
-        tmp_path / "m.txt",
+        tmp_path / "m.waypoints",
     )
     with vehicle("px4", Reticent) as (source, mock):
         for each in MissionType:
