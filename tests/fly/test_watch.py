@@ -27,7 +27,7 @@ def test_a_vehicle_that_does_not_arm_or_start_is_left_as_it_is() -> None:
     answer = "the vehicle answers ARM with FAILED (it tried, or checked, and it did not work)"
     assert scene.watch.outcome.text == f"{answer}. It says: Arm: Compass not healthy"
     scene = Scene("px4", arm=True)
-    scene.mock._problem = lambda: "no valid mission"
+    scene.mock._flyable = lambda: None
     assert scene.run() == "refused"
     assert list(dict.fromkeys(scene.commands)) == [ARM, START, DISARM]
     denied = "answers START with DENIED (not as it was asked, or in the state that it is in)"
