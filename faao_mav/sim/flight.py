@@ -182,8 +182,8 @@ class Flight:
 
     def arm(self, now: float) -> None:
         """Turn the motors on."""
-        self.armed = True
         self._do("hold", now)
+        self.armed = True
 
     def enter(self, mode: int, now: float) -> None:
         """Change to `mode`, and do what it asks for; a mission is begun apart."""

@@ -230,7 +230,7 @@ def test_at_its_fence_it_does_what_its_parameters_say(
     """ArduPilot returns, PX4 holds by default; where it is not to be kept it flies on."""
     desk = desk_for(kind, OUT, parameters=parameters)
     take_off(desk, kind)
-    desk.wait(300.0)
+    desk.wait(220.0)
     flown = only(desk.sent, messages.GlobalPositionInt)
     north = [(place.lat * 1e-7 - HOME.latitude) * 111_000 for place in flown]
     assert max(north) == pytest.approx(farthest, abs=3)
