@@ -1,7 +1,6 @@
 """`faao-mission`: which command an argument list is for."""
 
 import difflib
-import gc
 import io
 import os
 import signal
@@ -21,10 +20,6 @@ from faao_mav.cli.serving import autopilot
 from faao_mav.cli.study import study
 from faao_mav.cli.vehicle import debrief, download, fly, upload
 from faao_mav.errors import HangUp
-
-_ALLOCATIONS = 50_000
-"""Allocations between two collections of garbage, 700 in Python by default. Chosen: with none at
-the end, it saves 0.09 of 1.2 s of the main job."""
 
 
 class _CommandOrPlan(TyperGroup):
@@ -105,7 +100,6 @@ def run() -> None:
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, handler)
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # small matrices: more threads wait and spin
-    gc.set_threshold(_ALLOCATIONS)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -116,5 +110,3 @@ def run() -> None:
         cli.note(f"{where}: cannot be used: {error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is buffered fails no second time
         sys.exit(2)
-    finally:
-        gc.freeze()  # at the end all memory goes: no search for garbage in it

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from faao_mav.plan import Plan
     from faao_mav.study import StudyCase, StudyRow
 
+_POINTS = 12  # of a frontier, unless told otherwise. Chosen: a smooth curve by eye
 _INTERRUPTED = 130  # the exit status of an interrupted study, as a shell reports SIGINT: 128 + 2
 
 
@@ -39,27 +40,22 @@ class _Asked:
         Raises `PlanError` for values that no case can use; some may fail and become rows.
         """
         from faao_mav.plan import parse_plan
-        from faao_mav.plan.keys import POWER
+        from faao_mav.plan.keys import POWER, varied_twice
         from faao_mav.plan.sections import Study
         from faao_mav.study import make_cases, parse_vary
-        from faao_mav.study.sweep import (
-            POINTS,
-            frontier_cases,
-            join_grid,
-            parse_frontier,
-            parse_schemes,
-            parse_values,
-        )
+        from faao_mav.study.sweep import frontier_cases, parse_frontier, parse_schemes, parse_values
 
         options = [parse_vary(text) for text in self.vary or []]
         if self.power is not None:
             options.append((POWER, parse_values(self.power, "--power")))
-        grid, along, asked = join_grid(options), None, plan.study or Study()
+        if both := varied_twice(key for key, _ in options):
+            raise InputError(f"--vary {both}: varied twice; give all values in one option")
+        grid, along, asked = dict(options), None, plan.study or Study()
         if self.frontier is not None:
             if grid or self.schemes is not None or self.seeds is not None:
                 raise InputError("--frontier: leave --vary, --power, --schemes and --seeds out")
             along = parse_frontier(self.frontier)
-            cases = frontier_cases(plan, along, self.points or POINTS)
+            cases = frontier_cases(plan, along, self.points or _POINTS)
         elif self.points is not None:
             raise InputError(f"--points {self.points}: is for a frontier; give --frontier too")
         else:
@@ -101,8 +97,10 @@ def study(
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
     from faao_mav.plan import read_plan
+    from faao_mav.plan.sections import Study
+    from faao_mav.report.style import save_figure
     from faao_mav.study import run_study
-    from faao_mav.study.figure import frontier_table
+    from faao_mav.study.figure import frontier_figure, frontier_table, study_figure
     from faao_mav.study.rows import as_dict, comparison
 
     if jobs == 0:
@@ -123,7 +121,17 @@ def study(
             kept = f"finished rows are in {out}; the same command goes on there"
         cli.note(f"interrupted; {kept}")
         raise typer.Exit(_INTERRUPTED) from None
-    written = _draw(rows, plan, along, out) if out is not None else []
+    written = []
+    if out is not None:
+        written, kind = [out / "rows.jsonl", out / "table.csv"], (plan.study or Study()).figure
+        try:
+            figure = frontier_figure(rows, plan, along) if along else study_figure(rows, plan, kind)
+        except InputError:
+            pass  # there is nothing to draw
+        else:
+            for path in (out / "figure.svg", out / "figure.png"):
+                save_figure(figure, path)
+                written.append(path)
     text = frontier_table(rows, plan, along) if along else comparison(rows)
     cli.show(
         lambda: {"rows": [as_dict(row) for row in rows], "written": written},
@@ -131,18 +139,3 @@ def study(
         as_json=as_json,
         good=not all(row.error for row in rows),
     )
-
-
-def _draw(rows: "Sequence[StudyRow]", plan: "Plan", along: str | None, out: Path) -> list[Path]:
-    """Add the figure to what the study has written, where there is something to draw."""
-    from faao_mav.plan.sections import Study
-    from faao_mav.report.style import save_figure
-    from faao_mav.study.figure import can_draw, frontier_figure, study_figure
-
-    written, kind = [out / "rows.jsonl", out / "table.csv"], (plan.study or Study()).figure
-    if can_draw(rows, kind):
-        figure = frontier_figure(rows, plan, along) if along else study_figure(rows, plan, kind)
-        for path in (out / "figure.svg", out / "figure.png"):
-            save_figure(figure, path)
-            written.append(path)
-    return written

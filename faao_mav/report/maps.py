@@ -1,7 +1,7 @@
 """Maps: of a plan's route with its speeds, and of a mission alone, each with what is about it."""
 
 import itertools
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,9 +14,7 @@ from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import areas_of
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import Plan
 from faao_mav.report import style
-from faao_mav.schedule.assemble import way_home, way_out
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.vector import lengths
@@ -57,9 +55,6 @@ def route_map(
     if conversion is not None:
         seen.append(conversion.schedule.track()["predicted_w"])
         plot.plot(*seen[-1].T, "--", color=style.INK, linewidth=0.9, label="predicted")
-        for way in _ways(plan, conversion) if outlines else ():
-            seen.append(way)
-            plot.plot(*way.T, color=style.MUTED, linewidth=0.9, label="from and to home")
         numbers = _draw_items(plot, conversion.mission, frame, WAYPOINTS, "waypoint")
         seen += [place[np.newaxis] for _, place in numbers]
     if any(station.moves for station in plan.radio.stations):  # its way is drawn with its mark
@@ -110,14 +105,6 @@ def _draw_fence(plot: "Axes", fence: Fence, frame: LocalFrame) -> list[Real]:
             if not area.inclusion:
                 plot.fill(*ring.T, color=colour, alpha=0.15, linewidth=0)
     return outlines
-
-
-def _ways(plan: Plan, conversion: Conversion) -> Iterator[Real]:
-    """Yield the ways (k, 2), m, from home to the route, and back if the mission returns."""
-    home, route = np.zeros((1, 2)), conversion.schedule.route.positions
-    yield np.vstack([home, way_out(plan, route[0]), route[:1]])
-    if plan.mission.on_finish == "rtl":
-        yield np.vstack([route[-1:], way_home(plan, route[-1]), home])
 
 
 def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real]) -> None:

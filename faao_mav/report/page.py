@@ -102,21 +102,18 @@ def _sections(about: Result | Check | FromLog) -> Iterator[str]:
     if check is not None:
         yield section("Findings", _findings(check.findings), "wide")
     if result is not None and result.conversion is not None and result.conversion.parameters:
-        rows = [(name, f"{value:g}") for name, value in result.conversion.parameters.items()]
+        wanted = ((name, f"{value:g}") for name, value in result.conversion.parameters.items())
         told = "<p>The mission is timed for these: load them first.</p>"
-        yield section("Parameters", told + _table(("parameter", "value"), rows))
+        yield section("Parameters", told + facts(wanted))
     if check is not None:
         for shown in mission_figures(check, alone=judged is not None):
             yield figure_section(*shown)
     if result is not None:
         for shown in plan_figures(result, log):
             yield figure_section(*shown)
-        solution = result.solution
-        if len(solution.starts) > 1:
-            ranked = sorted(solution.starts.items(), key=lambda start: -start[1])
-            head = ("start", f"{solution.plan.radio.maximised}, bit/s/Hz")
-            yield section("Starts", _table(head, [(name, f"{rate:.4f}") for name, rate in ranked]))
-        yield section("Plan", f"<pre>{escape(text_of(solution.plan.text))}</pre>", "wide text")
+        yield section(
+            "Plan", f"<pre>{escape(text_of(result.solution.plan.text))}</pre>", "wide text"
+        )
 
 
 def facts(lines: Iterable[Line]) -> str:
@@ -150,11 +147,3 @@ def section(heading: str, content: str, kind: str = "") -> str:
     """Return a section under its heading; its `kind` are classes of the style."""
     marked = f' class="{kind}"' if kind else ""
     return f"<section{marked}>\n<h2>{heading}</h2>\n{content}\n</section>"
-
-
-def _table(head: tuple[str, str], rows: Sequence[tuple[str, str]]) -> str:
-    def cells(tag: str, row: tuple[str, str]) -> str:
-        return "<tr>" + "".join(f"<{tag}>{escape(text)}</{tag}>" for text in row) + "</tr>"
-
-    body = "".join(cells("td", row) for row in rows)
-    return f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>"

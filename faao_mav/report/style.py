@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
+    from matplotlib.path import Path as MatplotlibPath
 
 INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
 """Colours of text, of what is secondary, of grids and of the paper; a page replaces them."""
@@ -35,12 +36,11 @@ vanish on white and on black paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # of curves, in the order of `SERIES`
 WIDTH = 4.2  # inches: a page makes a figure as wide as a phone, where 9 points must still be read
 
-_AROUND = np.array([(x, y) for x, y in itertools.product((1, -1, 0), repeat=2) if x or y])
+_SIDES = [np.array(side) for side in itertools.product((1, -1, 0), repeat=2) if any(side)]
 """The sides of a place on which a text may stand, from the first that is tried on."""
-_NEAR, _FAR, _CLEAR = 4.0, 16.0, 2.5
-"""Points from a place to its text, at most to one that is not left out, and from a text to lines
-and other texts. Chosen: beside the map's widest line, of 5 points, texts stay clear."""
-_STEP = 4.0  # pixels between two places of a line that no text is to cover: a text is 10 high
+_AWAY, _CLEAR = (4.0, 16.0), 2.5
+"""Points from a place to its text, the second for one that is not left out, and from a text to
+lines and other texts. Chosen: beside the map's widest line, of 5 points, texts stay clear."""
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
@@ -142,8 +142,7 @@ def mark_stations(
             middle = max(1, int(np.argmax(left <= left[0] / 2)))
             arrow = {"arrowstyle": "-|>", "color": INK, "mutation_scale": 14}
             axes.annotate("", way[middle], way[middle - 1], arrowprops=arrow, zorder=5)
-    named = [(name, way[0]) for name, way, _ in places]
-    write_beside(axes, [*named, *more], always=len(named))
+    write_beside(axes, [*((name, way[0]) for name, way, _ in places), *more], always=len(places))
 
 
 def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0) -> None:
@@ -155,8 +154,8 @@ def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()  # from here on places on the paper are known
-    pixels = figure.dpi / 72
-    paper, dots = axes.get_window_extent(), _drawn(axes)
+    pixels, paper = figure.dpi / 72, axes.get_window_extent()
+    lines, marks = _drawn(axes)
     taken: list[Any] = []
     for k, (text, place) in enumerate(texts):
         shown = axes.annotate(
@@ -165,40 +164,35 @@ def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0
             bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
         )  # fmt: skip
         box = shown.get_window_extent()
-        size = np.array([box.width, box.height]) / 2
-        tried = []
-        for away in (_NEAR, _FAR) if k < always else (_NEAR,):
-            for side in _AROUND:
-                offset = side * (size + away * pixels)
-                there = box.translated(*offset)
-                clear = there.padded(_CLEAR * pixels)
-                outside = not (paper.contains(*there.min) and paper.contains(*there.max))
-                covers = clear.count_contains(dots) + 1e3 * clear.count_overlaps(taken)
-                tried.append((covers + 1e6 * outside, offset, there))
-        covers, offset, there = min(tried, key=lambda each: each[0])
-        if covers and k >= always:
+        size, tried = np.array([box.width, box.height]) / 2, []
+        for away, side in itertools.product(_AWAY[: 2 if k < always else 1], _SIDES):
+            offset = side * (size + away * pixels)
+            there = box.translated(*offset)
+            clear = there.padded(_CLEAR * pixels)
+            outside = not (paper.contains(*there.min) and paper.contains(*there.max))
+            covers = sum(line.intersects_bbox(clear, filled=False) for line in lines)
+            covers += clear.count_contains(marks)
+            tried.append(((outside, clear.count_overlaps(taken), covers), offset, there))
+        covered, offset, there = min(tried, key=lambda each: each[0])
+        if any(covered) and k >= always:
             shown.remove()
         else:
             shown.set_position(offset / pixels)
             taken.append(there)
 
 
-def _drawn(axes: "Axes") -> Real:
-    """Return places (n, 2), pixels, along all lines of a plot and at its marks."""
+def _drawn(axes: "Axes") -> tuple[list["MatplotlibPath"], Real]:
+    """Return the lines of a plot, and the places (n, 2) of its marks, pixels."""
     from matplotlib.collections import LineCollection
+    from matplotlib.path import Path as MatplotlibPath
 
-    ways = [line.get_xydata() for line in axes.lines if line.get_linestyle() != "None"]
-    ways = [way for way in ways if np.size(way)]  # of a mere entry of the legend there is none
-    for each in axes.collections:
-        if isinstance(each, LineCollection):
-            ways += each.get_segments()
+    routes = [each for each in axes.collections if isinstance(each, LineCollection)]
+    ways: list[Any] = [np.concatenate(route.get_segments()) for route in routes]
+    ways += [line.get_xydata() for line in axes.lines if line.get_linestyle() != "None"]
     marks = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
-    places = [np.empty((0, 2)), *map(axes.transData.transform, marks)]
-    for way in map(axes.transData.transform, ways):
-        along = np.cumsum([0.0, *lengths(np.diff(way, axis=0))])
-        at = np.arange(0.0, along[-1] + _STEP, _STEP)
-        places.append(np.stack([np.interp(at, along, x) for x in way.T], axis=1))
-    return np.concatenate(places)
+    to_pixels = axes.transData.transform
+    lines = [MatplotlibPath(to_pixels(way)) for way in ways if len(way)]
+    return lines, np.asarray(to_pixels(np.concatenate([np.empty((0, 2)), *marks])))
 
 
 def render(figure: "Figure", suffix: str) -> bytes:

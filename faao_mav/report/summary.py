@@ -8,7 +8,6 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.errors import counted
-from faao_mav.optimizer.kinematics import kinematics
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
@@ -20,7 +19,6 @@ from faao_mav.validate.rule import by_rule, count_of, line_of
 from faao_mav.vector import lengths
 from faao_mav.workflow import Result
 
-_AT_LIMIT = 0.999  # the share of a limit at which it counts as reached. Chosen
 _LOSS_TOLD = 0.01  # share of R_avg that is lost before a plan for R_avg is warned about. Chosen
 _MOST_ZONES = 12  # zones of a fence that are named: a few lines. Chosen
 _LABEL_WIDTH = 13  # characters that a label takes on the terminal
@@ -69,67 +67,19 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
 
     With `timed` it says how long that took, which no two runs have in common.
     """
-    solution, plan, fresh = result.solution, result.solution.plan, result.fresh
-    rates, delivered, radio = solution.rates, solution.delivered_rate, plan.radio
+    solution, plan = result.solution, result.solution.plan
     yield from _goal(solution)
     yield from _height(solution)
-    limit = result.saturation
-    stairs = solution.problem.uav_user.steps is not None
-    limiting = "radio's rates" if stairs else "alphabet"
-    most = f", at most {limit.ceiling:.5g} by the {limiting}" if limit else ""
-    measure = "" if plan.optimizer.rate == "cutoff" else " of mutual information"
-    hops = f"base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f}"
-    yield "rate", f"{_told_rate(rates.R_avg, radio.bandwidth_mhz)}{most}{measure} ({hops})"
-    half, share = radio.duplex == "half", delivered / rates.R_avg if rates.R_avg else 1.0
-    if not radio.causal and share < 1 - _LOSS_TOLD:
-        told = f"warning: {100 * (1 - share):.2g} % of R_avg does not arrive: "
-        told += "both hops share the time, and the relay " if half else "the relay "
-        told += "forwards only what it has received; radio.causal: true plans for what arrives"
-        yield "", told
-    told = _told_rate(delivered, radio.bandwidth_mhz) + _megabytes(plan.megabytes(delivered))
-    told += "; in half duplex " if half else "; "
-    yield "delivered", f"{told}{100 * share:.2f} % of R_avg"
-    if (under := result.shadowed) is not None:
-        arrives = under.quantiles
-        told = f"{_told_rate(arrives[0.1], radio.bandwidth_mhz)} or more arrives in nine of ten "
-        told += f"shadowings, {arrives[0.5]:.4f} in half of them, {under.mean:.4f} in the mean"
-        yield "shadowing", told
-        if (kept := radio.reliability) is not None:
-            least = arrives[round(1 - kept, 9)]
-            yield "", f"planned for what arrives in {100 * kept:g} % of them: {least:.4f} bit/s/Hz"
-    if (information := result.information) is not None:
-        told = f"mutual information {information.average:.3f} +- {information.error:.1g}"
-        yield "information", f"{told}, {information.delivered:.3f} delivered"
-    if solution.gain is not None:
-        error = information.error if information else 0.0
-        told = f"{solution.gain:.4f} bit/s/Hz more than by the plan for the cutoff rate"
-        doubt = f", below the error of averages over the noise, {error:.1g}"
-        yield "", told + doubt * (solution.gain <= error)
-    if fresh:
-        told = f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} bit/s/Hz delivered, R_avg "
-        told += f"{fresh.average:.4f} +- {fresh.error:.1g}, on draws that were not planned on"
-        yield "new fading", told
-    if result.bound is not None:
-        reached, value = delivered if radio.causal else rates.R_avg, result.bound.value
-        short = 100 * (1 - reached / value) if value else 0.0
-        most = f"at most {_told_rate(value, radio.bandwidth_mhz)} (estimate)"
-        yield "bound", f"within {short:.2g} % of the best that any route can do: {most}"
-    if limit is not None and limit.saturated:
-        told = "the highest rate is had" if stairs else "the alphabet is used up"
-        told += " and the route hardly matters: "
-        yield "saturated", f"{told}{limit.spare_db:.1f} dB less power at both stations would do"
-    if len(solution.starts) > 1:
-        (worst, low), *_, (best, high) = sorted(solution.starts.items(), key=lambda each: each[1])
-        told = f"{len(solution.starts)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
-        yield "starts", told
-    told = "converged" if solution.converged else "NOT CONVERGED"
-    told += f" after {counted(solution.iterations, 'iteration')}"
-    told += f", which took {result.seconds_optimize:.1f} s" if timed else ""
-    yield "optimiser", f"{told}: {solution.ending}"
-    yield "", f"{solution.history[0]:.4f} bit/s/Hz on the straight start"
-    yield from _limits(solution)
+    yield from _rates(result)
+    yield from _optimum(result, timed)
     yield from _mission(result)
-    yield from _wind(plan)
+    wind = plan.site.wind
+    told = (
+        [f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees"] if wind.speed else []
+    )
+    told += [f"gusts of {wind.gust:g} m/s"] if wind.gust > wind.speed else []
+    if told:
+        yield "wind", "; ".join(told)
     yield from _moving(solution, result.check)
     yield from _energy(result.check)
     yield from _fenced(result)
@@ -187,7 +137,6 @@ def _headline(result: Result) -> str:
 
 
 def _wrong(result: Result) -> str:
-    """Return how many errors and warnings validation found."""
     found = {finding.level for finding in result.findings} - {Level.NOTE}
     counts = [count_of(result.findings, level) for level in Level if level in found]
     return ", ".join(counts) or "no errors or warnings"
@@ -206,13 +155,79 @@ def _checked(result: Result) -> Iterator[Line]:
         yield "parameters", f"the mission is timed for {wanted}: load them first"
 
 
+def _rates(result: Result) -> Iterator[Line]:
+    """Yield the planned rates, what of them arrives, and by which other measures."""
+    solution, plan, information = result.solution, result.solution.plan, result.information
+    rates, delivered, radio = solution.rates, solution.delivered_rate, plan.radio
+    half, share = radio.duplex == "half", delivered / rates.R_avg if rates.R_avg else 1.0
+    limiting = "alphabet" if solution.problem.uav_user.steps is None else "radio's rates"
+    most = (
+        f", at most {limit.ceiling:.5g} by the {limiting}" if (limit := result.saturation) else ""
+    )
+    measure = "" if plan.optimizer.rate == "cutoff" else " of mutual information"
+    hops = f"base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f}"
+    yield "rate", f"{_told_rate(rates.R_avg, radio.bandwidth_mhz)}{most}{measure} ({hops})"
+    if not radio.causal and share < 1 - _LOSS_TOLD:
+        told = f"warning: {100 * (1 - share):.2g} % of R_avg does not arrive: "
+        told += "both hops share the time, and the relay " if half else "the relay "
+        told += "forwards only what it has received; radio.causal: true plans for what arrives"
+        yield "", told
+    told = _told_rate(delivered, radio.bandwidth_mhz) + _megabytes(plan.megabytes(delivered))
+    yield "delivered", f"{told}; {'in half duplex ' * half}{100 * share:.2f} % of R_avg"
+    if (under := result.shadowed) is not None:
+        arrives = under.quantiles
+        told = f"{_told_rate(arrives[0.1], radio.bandwidth_mhz)} or more arrives in nine of ten "
+        told += f"shadowings, {arrives[0.5]:.4f} in half of them, {under.mean:.4f} in the mean"
+        yield "shadowing", told
+        if (kept := radio.reliability) is not None:
+            least = arrives[round(1 - kept, 9)]
+            yield "", f"planned for what arrives in {100 * kept:g} % of them: {least:.4f} bit/s/Hz"
+    if information is not None:
+        told = f"mutual information {information.average:.3f} +- {information.error:.1g}"
+        yield "information", f"{told}, {information.delivered:.3f} delivered"
+    if solution.gain is not None:
+        error = information.error if information else 0.0
+        told = f"{solution.gain:.4f} bit/s/Hz more than by the plan for the cutoff rate"
+        doubt = f", below the error of averages over the noise, {error:.1g}"
+        yield "", told + doubt * (solution.gain <= error)
+    if fresh := result.fresh:
+        told = f"{fresh.delivered:.4f} +- {fresh.delivered_error:.1g} bit/s/Hz delivered, R_avg "
+        told += f"{fresh.average:.4f} +- {fresh.error:.1g}, on draws that were not planned on"
+        yield "new fading", told
+
+
+def _optimum(result: Result, timed: bool) -> Iterator[Line]:
+    """Yield how near the flight is to the best, what limits it, and how it was found."""
+    solution, radio = result.solution, result.solution.plan.radio
+    if result.bound is not None:
+        reached = solution.delivered_rate if radio.causal else solution.rates.R_avg
+        value = result.bound.value
+        short = 100 * (1 - reached / value) if value else 0.0
+        most = f"at most {_told_rate(value, radio.bandwidth_mhz)} (estimate)"
+        yield "bound", f"within {short:.2g} % of the best that any route can do: {most}"
+    if result.saturation is not None and result.saturation.saturated:
+        stairs = solution.problem.uav_user.steps is not None
+        told = "the highest rate is had" if stairs else "the alphabet is used up"
+        less = f"{result.saturation.spare_db:.1f} dB less power at both stations would do"
+        yield "saturated", f"{told} and the route hardly matters: {less}"
+    if len(solution.starts) > 1:
+        (worst, low), *_, (best, high) = sorted(solution.starts.items(), key=lambda each: each[1])
+        told = f"{len(solution.starts)}, from {low:.4f} ({worst}) to {high:.4f} ({best}) bit/s/Hz"
+        yield "starts", told
+    told = "converged" if solution.converged else "NOT CONVERGED"
+    told += f" after {counted(solution.iterations, 'iteration')}"
+    told += f", which took {result.seconds_optimize:.1f} s" if timed else ""
+    yield "optimiser", f"{told}: {solution.ending}"
+    yield "", f"{solution.history[0]:.4f} bit/s/Hz on the straight start"
+
+
 def _mission(result: Result) -> Iterator[Line]:
-    conversion, flown, solution = result.conversion, result.prediction, result.solution
+    conversion, flown = result.conversion, result.prediction
     if result.no_mission is not None:
         yield "mission", f"none: {result.no_mission}"
     if conversion is None or flown is None:
         return
-    *carried, near = beside(solution, flown)
+    *carried, near = beside(result.solution, flown)
     items = counted(len(conversion.mission.items), "item")
     way = f"{conversion.schedule.route.distance:.0f} m in {flown.duration:.1f} s"
     yield "mission", f"{items}; relay route of {way}"
@@ -223,25 +238,24 @@ def _mission(result: Result) -> Iterator[Line]:
 
 def _goal(solution: Solution) -> Iterator[Line]:
     """Yield what a goal led to, and for a least quantity what one step less would deliver."""
-    plan = solution.plan
+    plan, goal = solution.plan, solution.plan.goal
     if (found := solution.least) is None:
         return
     flights = f"{found.optimizations} flights optimised"
-    if plan.goal.energy_wh is not None:
-        told = f"most data within {plan.goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
-        told += f"({found.limit:g} s given), {solution.energy_wh:.4g} Wh; {flights}"
-        yield "goal", told
+    if goal.energy_wh is not None:
+        told = f"most data within {goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
+        yield "goal", f"{told}({found.limit:g} s given), {solution.energy_wh:.4g} Wh; {flights}"
         return
-    of = plan.goal.minimise or ""
-    units = {"duration": "s given", "power": "dBm given", "energy": "Wh without that goal"}
-    limit = f"{found.limit:{'.4g' if of == 'energy' else 'g'}} {units[of]}"
-    told = f"least {of} for {_asked(plan, plan.needed_rate)}: {_minimised(solution)} ({limit})"
-    yield "goal", f"{told}; {flights}"
+    energy = goal.minimise == "energy"
+    unit = "dBm given" if goal.minimise == "power" else "s given"
+    limit = f"{found.limit:.4g} Wh without that goal" if energy else f"{found.limit:g} {unit}"
+    told = f"least {goal.minimise} for {_asked(plan, plan.needed_rate)}: {_brought(solution)}"
+    yield "goal", f"{told} ({limit}); {flights}"
     if (below := found.below) is None:
-        yield "", f"no flight takes less {'energy' if of == 'energy' else 'time'}"
+        yield "", f"no flight takes less {'energy' if energy else 'time'}"
     else:
         delivered = _asked(below.plan, below.delivered_rate)
-        yield "", f"{_minimised(below)} would deliver {delivered}"
+        yield "", f"{_brought(below)} would deliver {delivered}"
 
 
 def _height(solution: Solution) -> Iterator[Line]:
@@ -256,57 +270,23 @@ def _height(solution: Solution) -> Iterator[Line]:
 
 
 def _brought(solution: Solution) -> str:
-    """Return what a solution is compared by with those of other heights."""
-    plan = solution.plan
-    if plan.goal.minimise is not None:
-        return _minimised(solution)
-    if plan.goal.maximise == "data":
+    """Return how much of what its plan's goal minimises or maximises a solution has."""
+    plan, goal = solution.plan, solution.plan.goal
+    if goal.minimise == "duration":
+        return f"{plan.flight.duration:g} s"
+    if goal.minimise == "energy":
+        return f"{solution.energy_wh:.4g} Wh in {plan.flight.duration:g} s"
+    if goal.minimise == "power":
+        return f"{' and '.join(dict.fromkeys(f'{dbm(power):.2f}' for power in plan.powers))} dBm"
+    if goal.maximise == "data":
         return f"{solution.delivered_rate * plan.flight.duration:.5g} bit/Hz"
     return f"{solution.delivered_rate if plan.radio.causal else solution.rates.R_avg:.4f} bit/s/Hz"
-
-
-def _minimised(solution: Solution) -> str:
-    """Return how much of what its plan's goal minimises a solution has."""
-    plan = solution.plan
-    if plan.goal.minimise == "duration":
-        return f"{plan.flight.duration:g} s"
-    if plan.goal.minimise == "energy":
-        return f"{solution.energy_wh:.4g} Wh in {plan.flight.duration:g} s"
-    powers = dict.fromkeys(f"{dbm(power):.2f}" for power in plan.powers)
-    return f"{' and '.join(powers)} dBm"
 
 
 def _asked(plan: Plan, rate: float) -> str:
     """Return what `rate`, bit/s/Hz, delivers in the unit of the plan's goal."""
     megabytes = plan.megabytes(rate) if plan.goal.deliver_mbytes is not None else None
     return f"{rate:.4f} bit/s/Hz" if megabytes is None else f"{megabytes:.5g} megabytes"
-
-
-def _limits(solution: Solution) -> Iterator[Line]:
-    """Yield how fast turns and the airspeed change at most, where that binds the plan."""
-    kin = kinematics(solution.plan)
-    if kin.turn_binds:
-        turned = lengths(solution.a)[:-1] > _AT_LIMIT * kin.turn_limits(solution.v)
-        if turned.any():
-            told = f"by at most {math.degrees(kin.most_turn):.3g} degrees per second over ground, "
-            told += "as the vehicle's guidance follows, which binds the plan for "
-            yield "turns", f"{told}{kin.time_step * turned.sum():.3g} s"
-    speed = lengths(solution.v - kin.wind)
-    change, square = np.diff(speed) / kin.time_step, np.diff(speed**2) / (2 * kin.time_step)
-    bound = (change < -_AT_LIMIT * kin.most_fall) | (square > _AT_LIMIT * kin.most_power)
-    if bound.any():
-        told = f"falls by at most {kin.most_fall:.2g} m/s^2 and rises by at most "
-        told += f"{kin.most_power / kin.max_speed:.2g}, as the vehicle's does, which binds the "
-        yield "airspeed", f"{told}plan for {kin.time_step * bound.sum():.3g} s"
-
-
-def _wind(plan: Plan) -> Iterator[Line]:
-    wind = plan.site.wind
-    mean = f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees"
-    told = [mean] if any(plan.wind) else []
-    told += [f"gusts of {wind.gust:g} m/s"] if wind.gust > wind.speed else []
-    if told:
-        yield "wind", "; ".join(told)
 
 
 def _moving(solution: Solution, check: Check | None) -> Iterator[Line]:
@@ -342,8 +322,8 @@ def _fenced(result: Result) -> Iterator[Line]:
     if (fence := result.fence) is None:
         return
     zones = fence["zones"]
-    more = f" and {len(zones) - _MOST_ZONES} more" if len(zones) > _MOST_ZONES else ""
-    yield "fence", f"{', '.join(zones[:_MOST_ZONES])}{more}"
+    more = ["..."] if len(zones) > _MOST_ZONES else []
+    yield "fence", ", ".join([*zones[:_MOST_ZONES], *more])
     yield from (("", note) for note in fence["notes"])
     kept = f"the plan keeps {fence['planned_clearance']:.1f} m (margin {fence['margin']:g} m)"
     if fence["predicted_clearance"] is not None:
@@ -358,7 +338,6 @@ def _told_rate(rate: float, bandwidth_mhz: float | None) -> str:
 
 
 def _of_plan(rate: float, planned: float, bandwidth_mhz: float | None) -> str:
-    """Return `rate` as text, and its share of the `planned` one."""
     share = 100 * rate / planned if planned else 100.0
     return f"{_told_rate(rate, bandwidth_mhz)}, {share:.2f} % of the plan"
 

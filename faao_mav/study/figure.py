@@ -3,20 +3,20 @@
 A frontier is the most data for every duration, power or energy.
 """
 
+import itertools
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.plan.keys import POWER
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
-from faao_mav.study.rows import StudyRow, rates_by_place, spread
+from faao_mav.study.rows import StudyRow, failures, spread
 from faao_mav.study.sweep import ENERGY, Value
 
 if TYPE_CHECKING:
@@ -37,8 +37,18 @@ are their own labels, and an empty symbol leaves the value alone."""
 _CAUSAL = "radio.causal"
 """The key whose values are lines of one plot: what causality costs, and what planning wins back."""
 
+_OF_CAUSALITY = (
+    ("R_avg, planned for it", False, "R_avg"),
+    ("delivered, planned for it", True, "delivered"),
+    ("delivered, planned for R_avg", False, "delivered"),
+)
+"""Name of each of these lines, the value of the key, and the field of a row that is drawn."""
+
 _AMOUNTS = {"flight.duration": "duration, s", POWER: "power, dBm", ENERGY: "energy, Wh"}
 """What a frontier's axis and the column of its table are called."""
+
+_DRAWN = {"rate": ("R_avg", "rate R_avg"), "delivered": ("delivered", "delivered rate R_del")}
+"""The field of a row that a kind of figure draws, and the label of its axis."""
 
 _SCHEMES = {
     "faao": "FAAO",
@@ -52,17 +62,10 @@ _SCHEMES = {
 """The names of the schemes in legends, in the order of their looks in `SERIES` and `MARKERS`."""
 
 
-def can_draw(rows: Sequence[StudyRow], kind: str) -> bool:
-    """Tell whether there is something to draw: results, and for rates an axis of numbers."""
-    if all(row.R_avg is None for row in rows):
-        return False
-    return kind == "trajectories" or _axis(rows) is not None
-
-
 def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     """Return the figure `kind` of `rows`: `delivered`, `rate` (R_avg) or `trajectories`.
 
-    Raises `InputError` where `can_draw` says no.
+    Raises `InputError` where there is nothing to draw: no result, or for rates no axis of numbers.
 
     >>> from faao_mav import make_cases, read_plan, run_study
     >>> plan = read_plan("missions/copter_relay.yaml").changed({"radio.fading": "none"})
@@ -70,46 +73,38 @@ def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     >>> study_figure(rows, plan, "delivered").axes[0].get_xlabel()
     'height H, m'
     """
-    if not can_draw(rows, kind):
+    axis = _axis(rows)
+    if all(row.R_avg is None for row in rows) or (kind != "trajectories" and axis is None):
         raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
-    return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan, kind)
+    return (
+        _rates(rows, plan, kind, axis) if kind != "trajectories" and axis else _routes(rows, plan)
+    )
 
 
 def _axis(rows: Sequence[StudyRow]) -> str | None:
     """Return the varied key with the most numbers, at least two."""
-    counts = {}
+    counts: dict[str | None, int] = {None: 1}
     for key in rows[0].values:
         values = [row.values[key] for row in rows]
         if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
             counts[key] = len(set(values))
-    best = max(counts, key=lambda key: counts[key], default=None)
-    return best if best is not None and counts[best] > 1 else None
+    return max(counts, key=lambda key: counts[key])
 
 
-_DRAWN = {"rate": ("R_avg", "rate R_avg"), "delivered": ("delivered", "delivered rate R_del")}
-"""The field of a row that a kind of figure draws, and the label of its axis."""
-
-
-def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
+def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str, axis: str) -> "Figure":
     """Draw a rate over the axis: a line for each scheme, a panel for each of the other values."""
-    measure, unit = _DRAWN[kind]
-    if _CAUSAL in rows[0].values:
-        unit = "rate"
-    axis = _axis(rows)
-    assert axis is not None
-    others = [key for key in rows[0].values if key not in (axis, _CAUSAL)]
     panels: dict[str, list[StudyRow]] = {}
     for row in rows:
-        panels.setdefault(_named({key: row.values[key] for key in others}), []).append(row)
+        others = {key: row.values[key] for key in row.values if key not in (axis, _CAUSAL)}
+        panels.setdefault(_named(others), []).append(row)
     across = min(len(panels), 3)
     down = -(-len(panels) // across)
-    width = 5.4 if across == 1 else 3.3 * across
-    height = 0.5 + (3.4 if across == 1 else 2.9) * down
-    with drawing(width, height) as figure:
-        grid = figure.subplots(down, across, squeeze=False, sharex=True)
-        plots = list(grid.flat)
+    width, height = (5.4, 3.4) if across == 1 else (3.3 * across, 2.9)
+    unit = "rate" if _CAUSAL in rows[0].values else _DRAWN[kind][1]
+    with drawing(width, 0.5 + height * down) as figure:
+        plots = figure.subplots(down, across, squeeze=False, sharex=True).ravel().tolist()
         for plot, (name, inside) in zip(plots, panels.items(), strict=False):
-            _lines(plot, inside, axis, measure)
+            _lines(plot, inside, axis, _DRAWN[kind][0])
             title = name or plan.name or "rate by scheme"
             label(plot, title, _KEYS.get(axis, (axis,))[0], f"{unit}, bit/s/Hz")
             plot.tick_params(labelbottom=True)  # the plot beneath may be none
@@ -121,42 +116,27 @@ def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
 
 
 def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> None:
-    at = list(rows[0].values).index(axis)
-    for name, inside, shown, k in _series(rows, measure):
-        points = sorted(
-            (float(values[at]), fmean(rates), spread(rates))
-            for (values, _), rates in rates_by_place(inside, shown).items()
-            if rates
-        )
-        x, mean, deviation = np.array(points).reshape(-1, 3).T
-        k %= len(SERIES)
-        plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=name)
+    """Draw a line, with its spread over seeds, for each scheme, or for what causality costs."""
+    schemes = dict.fromkeys(row.scheme for row in rows)
+    kinds = _OF_CAUSALITY if _CAUSAL in rows[0].values else [("", None, measure)]
+    for scheme, (of, (name, causal, field)) in itertools.product(schemes, enumerate(kinds)):
+        found: dict[float, list[float]] = {}
+        for row in rows:
+            rate = getattr(row, field)
+            if row.scheme == scheme and row.values.get(_CAUSAL) is causal and rate is not None:
+                found.setdefault(float(row.values[axis]), []).append(rate)
+        if not found:
+            continue
+        x = sorted(found)
+        mean = np.array([fmean(found[at]) for at in x])
+        deviation = np.array([spread(found[at]) for at in x])
+        whose = _SCHEMES[scheme] if len(schemes) > 1 or not name else ""
+        k = (list(_SCHEMES).index(scheme) + of) % len(SERIES)
+        shown = ": ".join(filter(None, (whose, name)))
+        plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=shown)
         band = (mean - deviation, mean + deviation)
         plot.fill_between(x, *band, color=SERIES[k], alpha=0.2, linewidth=0)
     plot.set_ylim(bottom=0)
-
-
-def _series(
-    rows: Sequence[StudyRow], measure: str
-) -> Iterator[tuple[str, Sequence[StudyRow], str, int]]:
-    """Yield name, rows, measure and look of each line: of the schemes, and of `radio.causal`."""
-    schemes = list(dict.fromkeys(row.scheme for row in rows))
-    for scheme in schemes:
-        of_scheme = [row for row in rows if row.scheme == scheme]
-        k = list(_SCHEMES).index(scheme)
-        if _CAUSAL not in rows[0].values:
-            yield _SCHEMES[scheme], of_scheme, measure, k
-            continue
-        whose = f"{_SCHEMES[scheme]}: " if len(schemes) > 1 else ""
-        for causal, shown, name in (
-            (False, "R_avg", "R_avg, planned for it"),
-            (True, "delivered", "delivered, planned for it"),
-            (False, "delivered", "delivered, planned for R_avg"),
-        ):
-            inside = [row for row in of_scheme if row.values[_CAUSAL] is causal]
-            if inside:
-                yield whose + name, inside, shown, k
-                k += 1
 
 
 def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
@@ -225,12 +205,11 @@ def _data(row: StudyRow) -> float:
     return (row.delivered or 0.0) * len(row.route)
 
 
-def _amounts(rows: Sequence[StudyRow], plan: Plan) -> tuple[Real, str]:
+def _amounts(rows: Sequence[StudyRow], plan: Plan) -> tuple[list[float], str]:
     """Return what `rows` deliver, and in which unit."""
-    amounts = np.array([_data(row) for row in rows])
-    if plan.radio.bandwidth_mhz is not None:
-        return amounts, "megabytes"
-    return amounts * plan.flight.time_step, "bit/Hz"
+    banded = plan.radio.bandwidth_mhz is not None
+    scale, unit = (1.0, "megabytes") if banded else (plan.flight.time_step, "bit/Hz")
+    return [scale * _data(row) for row in rows], unit
 
 
 def frontier_table(rows: Sequence[StudyRow], plan: Plan, key: str) -> str:
@@ -240,21 +219,23 @@ def frontier_table(rows: Sequence[StudyRow], plan: Plan, key: str) -> str:
     lines = [f"{_AMOUNTS[key]:>12}  {f'delivered, {unit}':>20}  bit/s/Hz"]
     lines += [
         f"{row.values[key]:12g}  {amount:20.4g}  {row.delivered:8.4f}"
-        for row, amount in zip(best, amounts.tolist(), strict=True)
+        for row, amount in zip(best, amounts, strict=True)
     ]
-    failed = [row for row in rows if row.error]
-    if failed:
-        lines.append(f"{len(failed)} of {len(rows)} points failed, first: {failed[0].error}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *failures(rows, "points")])
 
 
 def frontier_figure(rows: Sequence[StudyRow], plan: Plan, key: str) -> "Figure":
-    """Return the figure of the frontier: the curve, and the route of each of its points."""
+    """Return the figure of the frontier: the curve, and the route of each of its points.
+
+    Raises `InputError` where no row has a result.
+    """
     from matplotlib import colormaps
 
     best = pareto(rows, key)
+    if not best:
+        raise InputError("nothing to draw: no result")
     amounts, unit = _amounts(best, plan)
-    at = np.array([float(row.values[key]) for row in best])
+    at = [float(row.values[key]) for row in best]
     colours = colormaps["viridis"](np.linspace(0, 0.9, len(best)))
     with drawing(9.6, 4.4) as figure:
         curve, routes = figure.subplots(1, 2)

@@ -95,17 +95,14 @@ def as_array(rows: Sequence[StudyRow]) -> NDArray[np.void]:
     >>> table["power_dbm"].tolist(), table["R_avg"].tolist()
     ([5, 10], [0.5, 1.0])
     """
-    records = [as_dict(row) for row in rows]
-    columns = {}
-    for name in dict.fromkeys(name for record in records for name in record):
-        values = [record.get(name) for record in records]
-        texts = any(isinstance(value, str) for value in values)
-        missing = "" if texts else math.nan
-        columns[name] = np.array([missing if value is None else value for value in values])
-    made = np.empty(len(rows), [(name, column.dtype) for name, column in columns.items()])
-    for name, column in columns.items():
-        made[name] = column
-    return made
+    records, columns = [as_dict(row) for row in rows], []
+    for name in records[0]:
+        values = [record[name] for record in records]
+        missing = "" if any(isinstance(value, str) for value in values) else math.nan
+        columns.append(np.array([missing if value is None else value for value in values]))
+    names: Any = list(records[0])
+    table: NDArray[np.void] = np.rec.fromarrays(columns, names=names).view(np.ndarray)
+    return table
 
 
 def append_row(row: StudyRow, directory: Path) -> None:
@@ -129,19 +126,17 @@ def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ..
     if not path.exists():
         return ()
     content = read_bytes(path, MAX_BYTES, "the rows of a study")
-    keys = {case.key for case in cases}
     rows: dict[str, StudyRow] = {}
     for number, line in enumerate(io.BytesIO(content), 1):
         if not line.endswith(b"\n"):
-            if not (line.startswith(_BEGINNING) or _BEGINNING.startswith(line)):
+            if line[: len(_BEGINNING)] != _BEGINNING[: len(line)]:
                 raise InputError(
                     f"{path}: its last line is no row of a study; give another directory"
                 )
             cut(path, len(content) - len(line))
             break
         row = _row(line, f"{path}: line {number}")
-        if row.key in keys:
-            rows[row.key] = row
+        rows[row.key] = row
     return in_order(cases, rows)
 
 
@@ -162,9 +157,8 @@ def _adapter() -> TypeAdapter[StudyRow]:
 
 def table(rows: Sequence[StudyRow]) -> str:
     """Return the rows as CSV: varied keys, scheme, seed, what came out, and the error if any."""
-    varied = list(dict.fromkeys(key for row in rows for key in row.values))
     out = io.StringIO()
-    writer = csv.DictWriter(out, [*varied, *_RESULTS], lineterminator="\n")
+    writer = csv.DictWriter(out, [*rows[0].values, *_RESULTS], lineterminator="\n")
     writer.writeheader()
     writer.writerows(as_dict(row) for row in rows)
     return out.getvalue()
@@ -182,59 +176,47 @@ def in_order(cases: Sequence[StudyCase], rows: Mapping[str, StudyRow]) -> tuple[
     )
 
 
-def rates_by_place(
-    rows: Sequence[StudyRow], measure: str
-) -> dict[tuple[tuple[str, ...], str], list[float]]:
-    """Return the field `measure` of all seeds by values and scheme, in order, bit/s/Hz.
-
-    The values are JSON: those of a position, a list or a mapping, can then be looked up.
-    """
-    found: dict[tuple[tuple[str, ...], str], list[float]] = {}
-    for row in rows:
-        rates = found.setdefault((tuple(map(json.dumps, row.values.values())), row.scheme), [])
-        rate = getattr(row, measure)
-        if rate is not None:
-            rates.append(rate)
-    return found
-
-
 def spread(rates: Sequence[float]) -> float:
     """Return the standard deviation of `rates`, 0 of a single one."""
     return stdev(rates) if len(rates) > 1 else 0.0
 
 
+def failures(rows: Sequence[StudyRow], what: str = "rows") -> list[str]:
+    """Return a line on how many of `rows` failed, and why the first did; none if none did."""
+    failed = [row for row in rows if row.error]
+    told = f"{len(failed)} of {len(rows)} {what} failed, first: "
+    return [told + failed[0].error] if failed else []
+
+
 def comparison(rows: Sequence[StudyRow]) -> str:
     """Return tables for people, of R_avg and of what is delivered, and what failed.
 
-    Values are down, schemes across, each cell has mean and spread.
+    Values are down, schemes across, each cell has mean and spread over the seeds.
     """
     text = [line for measure in ("R_avg", "delivered") for line in _compared(rows, measure)]
-    failed = [row for row in rows if row.error]
-    if failed:
-        text.append(f"{len(failed)} of {len(rows)} rows failed, first: {failed[0].error}")
-    loose = sum(row.converged is False for row in rows)
-    if loose:
+    text += failures(rows)
+    if loose := sum(row.converged is False for row in rows):
         text.append(f"{loose} of {len(rows)} rows did not converge")
     return "\n".join(text)
 
 
 def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
-    varied = list(dict.fromkeys(key for row in rows for key in row.values))
     schemes = list(dict.fromkeys(row.scheme for row in rows))
-    found = rates_by_place(rows, measure)
-    lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
-    for values in dict.fromkeys(values for values, _ in found):
-        cells = (_cell(found.get((values, scheme), [])) for scheme in schemes)
-        lines.append([*(value.strip('"') for value in values), *cells])
+    found: dict[tuple[str, ...], dict[str, list[float]]] = {}
+    for row in rows:
+        # as JSON: a position is a list or a mapping, which cannot be looked up
+        values = tuple(json.dumps(value).strip('"') for value in row.values.values())
+        rates = found.setdefault(values, {}).setdefault(row.scheme, [])
+        rates += [] if (rate := getattr(row, measure)) is None else [rate]
+    lines = [[*(key.rsplit(".", 1)[-1] for key in rows[0].values), *schemes]]
+    lines += [
+        [*values, *(_cell(of_scheme.get(scheme, [])) for scheme in schemes)]
+        for values, of_scheme in found.items()
+    ]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
-    return [
-        f"{measure}, bit/s/Hz{of_rate}",
-        *(
-            "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
-            for line in lines
-        ),
-    ]
+    table = ("  ".join(map(str.rjust, line, widths)) for line in lines)
+    return [f"{measure}, bit/s/Hz{of_rate}", *table]
 
 
 def _cell(rates: Sequence[float]) -> str:

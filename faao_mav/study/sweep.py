@@ -5,7 +5,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal, InvalidOperation
+from decimal import Decimal
 from importlib.metadata import version
 from typing import Any, TypeAlias, get_args
 
@@ -15,7 +15,7 @@ from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import dbm
-from faao_mav.plan.keys import ALIASES, POWER, unknown_key, varied_twice
+from faao_mav.plan.keys import ALIASES, POWER, unknown_key
 from faao_mav.plan.reader import changed
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
@@ -75,13 +75,6 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
     return key, parse_values(values, f"--vary {key}")
 
 
-def join_grid(options: Sequence[tuple[str, tuple[Value, ...]]]) -> dict[str, tuple[Value, ...]]:
-    """Return the values by key. Raises `InputError` where two options vary the same key."""
-    if both := varied_twice(key for key, _ in options):
-        raise InputError(f"--vary {both}: varied twice; give all values in one option")
-    return dict(options)
-
-
 def parse_values(text: str, option: str) -> tuple[Value, ...]:
     """Return the values of `start:stop:step`, the end included, or of `value,value,...` in YAML.
 
@@ -113,21 +106,19 @@ def parse_schemes(text: str) -> tuple[str, ...]:
 
 def _range(text: str, option: str) -> list[float]:
     """Return the numbers of `start:stop:step` in decimal arithmetic: 0:1:0.1 has 11."""
-    expected = f"{option}: {quote(text)} is no range; give start:stop:step, as -40:0:5"
     try:
         start, stop, step = (Decimal(part.strip()) for part in text.split(":"))
-    except (InvalidOperation, ValueError):
-        raise InputError(expected) from None
-    if not all(math.isfinite(float(number)) for number in (start, stop, step)):
-        raise InputError(expected)
-    if float(step) == 0 or (stop - start) / step < 0:
+        steps = (stop - start) / step
+        fine = steps >= 0 and all(math.isfinite(float(each)) for each in (start, stop, 1 / step))
+    except (ArithmeticError, ValueError):
+        fine = False
+    if not fine:
         raise InputError(
-            f"{option}: {quote(text)}: steps of {step:.6g} never come from {start:.6g} "
-            f"to {stop:.6g}"
+            f"{option}: {quote(text)} is no range; give start:stop:step, as -40:0:5, with steps "
+            "that come from start to stop"
         )
-    ratio = (stop - start) / step
-    _check_count(ratio, option)
-    numbers = [start + k * step for k in range(math.floor(ratio) + 1)]
+    _check_count(steps, option)
+    numbers = [start + k * step for k in range(math.floor(steps) + 1)]
     whole = all(part == part.to_integral_value() for part in (start, step))
     return [int(number) if whole else float(number) for number in numbers]
 
@@ -174,9 +165,6 @@ def make_cases(
     return tuple(made)
 
 
-POINTS = 12
-"""Points of a frontier, unless told otherwise. Chosen: a smooth curve by eye."""
-
 _DECIBELS = 20.0
 """How far below the plan's powers a frontier begins, dB. Chosen: from there on little arrives."""
 
@@ -202,7 +190,7 @@ def parse_frontier(text: str) -> str:
     return _FRONTIERS[axis.strip()]
 
 
-def frontier_cases(plan: Plan, key: str, points: int = POINTS) -> tuple[StudyCase, ...]:
+def frontier_cases(plan: Plan, key: str, points: int) -> tuple[StudyCase, ...]:
     """Return the cases of the most data at `points` values of `key`, the plan's own the last.
 
     Durations are whole time steps from the shortest on. Powers rise by the same dB at both

@@ -17,8 +17,6 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.plan import Vector, parse_plan
-from faao_mav.report.summary import result_lines
-from faao_mav.workflow import Result
 
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
 PLACES = {"bs": STATIONS[0], "user": STATIONS[1]}
@@ -186,9 +184,6 @@ def test_plans_with_it_are_solved(small_plan: MakePlan, kind: str) -> None:
     residuals = solution.residuals()
     assert residuals.pop("minimum speed") < 1e-6
     assert ("fall of airspeed" in residuals) == (kind == "plane")
-    told = [line for label, line in result_lines(Result(solution)) if label == "airspeed"]
-    assert bool(told) == (kind == "plane")
-    assert all(line.startswith("falls by at most 0.8 m/s^2") for line in told)
     assert max(residuals.values()) < 1e-6
     assert solution.rates.R_avg > 1.05 * solution.history[0]
 

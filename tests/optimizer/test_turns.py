@@ -12,8 +12,6 @@ from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Vector
-from faao_mav.report.summary import result_lines
-from faao_mav.workflow import Result
 
 PLANE = {
     "vehicle.type": "plane",
@@ -61,13 +59,9 @@ def test_turns_allowed_in_the_air_are_allowed_over_ground() -> None:
 
 def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: MakePlan) -> None:
     plan = small_plan(PLANE | {"vehicle.min_speed": 9})
-    solution, kin = optimize(plan), kinematics(plan)
-    share = turned(solution)
-    assert share.max() == pytest.approx(1, abs=1e-3)
+    solution = optimize(plan)
+    assert turned(solution).max() == pytest.approx(1, abs=1e-3)
     assert np.linalg.norm(solution.a, axis=1).max() > 1.1 * TURN * 9
-    told = dict(result_lines(Result(solution)))["turns"]
-    assert told.startswith(f"by at most {math.degrees(TURN):.3g} degrees per second over ground")
-    assert f"binds the plan for {kin.time_step * (share > 0.999).sum():.3g} s" in told
 
     lively = small_plan(PLANE | {"vehicle.min_speed": 9, "vehicle.parameters": {"NAVL1_PERIOD": 5}})
     assert not kinematics(lively).turn_binds

@@ -59,15 +59,17 @@ def test_the_cases_end_at_the_plan() -> None:
     assert powers[0].powers == pytest.approx([power / 100 for power in plan.powers])
 
 
-@pytest.mark.parametrize("text", ["power", "data,power", "mass,data", "power,data,data"])
-def test_other_trade_offs_are_refused(text: str) -> None:
-    with pytest.raises(InputError, match=r"--frontier .*duration,data or power,data"):
-        parse_frontier(text)
+def test_other_trade_offs_are_refused() -> None:
+    for text in ("power", "data,power", "mass,data", "power,data,data"):
+        with pytest.raises(InputError, match=r"--frontier .*duration,data or power,data"):
+            parse_frontier(text)
 
 
 def test_a_frontier_is_drawn_and_told(tmp_path: Path) -> None:
     plan = tmp_path / "plan.yaml"
-    plan.write_text(edited(SMALL, {"radio.fading": "none", "radio.bandwidth_mhz": 1}))
+    plan.write_text(
+        edited(SMALL, {"radio.fading": "none", "radio.bandwidth_mhz": 1, "flight.time_step": 1})
+    )
     run = ["study", str(plan), "--frontier", "duration,data", "--points", "3", "--jobs", "1"]
     told = CliRunner().invoke(app, [*run, "--out", str(tmp_path / "out"), "--json"])
     assert told.exit_code == 0, told.output

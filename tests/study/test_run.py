@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -26,8 +27,9 @@ from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_stud
 from faao_mav.study.figure import study_figure
 from faao_mav.study.rows import comparison
 
-QUICK = edited(SMALL, {"radio.fading": "none", "optimizer.starts": ["straight"]})
-CASES = make_cases(QUICK, vary={"power_dbm": (0, 10, 20)}, schemes=("faao", "mrt"))
+FEW = {"radio.fading": "none", "optimizer.starts": ["straight"], "flight.time_step": 1}
+QUICK = edited(SMALL, FEW)
+CASES = make_cases(QUICK, vary={"power_dbm": (0, 10)}, schemes=("faao", "mrt"))
 Whole = tuple[Path, tuple[StudyRow, ...]]
 
 CALL = """
@@ -96,7 +98,7 @@ def test_a_resumed_study_is_the_uninterrupted_one(tmp_path: Path, whole: Whole) 
     assert timeless(again) == timeless(whole[1])
     assert again[:2] == tuple(seen)  # not run again
     assert len(load_rows(tmp_path, CASES)) == len(CASES)
-    assert [row["scheme"] for row in table_in(tmp_path)] == (["faao", "mrt"] * 3)
+    assert [row["scheme"] for row in table_in(tmp_path)] == ["faao", "mrt"] * 2
 
 
 def test_processes_and_a_cluster_do_not_change_the_result(whole: Whole) -> None:
@@ -109,20 +111,14 @@ def test_processes_and_a_cluster_do_not_change_the_result(whole: Whole) -> None:
 
 
 def test_modules_beside_the_plan_are_not_run(plan: Path) -> None:
-    ran = plant(plan.parent)
-    script = plan.parent / "elsewhere" / "call.py"
+    ran, script = plant(plan.parent), plan.parent / "elsewhere" / "call.py"
     script.parent.mkdir()
     script.write_text(CALL)
-    command = [Path(sys.executable).with_name("faao-mission"), "study", plan.name]
-    calls: list[list[Any]] = [
-        [*command, "--power", "0,10", "--jobs", "2"],
-        [sys.executable, script],
-    ]
-    for each in calls:
-        done = subprocess.run(each, cwd=plan.parent, capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
-        assert not ran.exists()
-    assert done.stdout == "2 False\n"
+    done = subprocess.run(
+        [sys.executable, script], cwd=plan.parent, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "2 False\n", "")
+    assert not ran.exists()
 
 
 def test_what_is_refused(plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +148,7 @@ def test_what_is_refused(plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    result = run(plan, "--vary", "flight.duration=2,10", "--jobs", 1, "--out", out)
+    result = run(plan, "--vary", "flight.duration=4,10", "--jobs", 1, "--out", out)
     assert result.exit_code == 0, result.output
     assert "1 of 2 rows failed, first:" in result.stdout
     short, good = table_in(out)
@@ -166,9 +162,7 @@ def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> No
     assert "ergodic" in result.stdout
 
 
-def test_options_go_before_the_plans_study_of_which_the_main_job_takes_no_notice(
-    plan: Path, tmp_path: Path
-) -> None:
+def test_options_go_before_the_plans_study(plan: Path) -> None:
     study = {"vary": {"power_dbm": [0, 10]}, "schemes": ["faao"], "seeds": 2}
     plan.write_text(edited(QUICK, {"study": study}))
     rows = json.loads(run(plan, "--json", "--jobs", 1).stdout)["rows"]
@@ -176,13 +170,6 @@ def test_options_go_before_the_plans_study_of_which_the_main_job_takes_no_notice
     other = run(plan, "--power", "5", "--seeds", 1, "--schemes", "zf", "--json", "--jobs", 1)
     rows = json.loads(other.stdout)["rows"]
     assert [(row["power_dbm"], row["scheme"], row["seed"]) for row in rows] == [(5, "zf", 0)]
-    written = []
-    for section in ({}, {"study": study}):
-        plan.write_text(edited(QUICK, {"vehicle.max_speed": 10} | section))
-        out = tmp_path / "m.waypoints"
-        assert CliRunner().invoke(app, [str(plan), "--out", str(out), "--quiet"]).exit_code == 0
-        written.append(out.read_bytes())
-    assert written[0] == written[1]
 
 
 def test_what_is_no_row_is_refused_by_its_line(whole: Whole, tmp_path: Path) -> None:
@@ -220,25 +207,27 @@ def test_cases_that_make_the_same_plan_share_a_row_and_keep_their_values(tmp_pat
     assert again.route.tolist() == first.route.tolist()
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
 def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
-    tmp_path: Path, whole: Whole, jobs: int, plan: Path
+    tmp_path: Path, whole: Whole, plan: Path
 ) -> None:
     path = tmp_path / "out" / "rows.jsonl"
-    arguments = (plan, "--power", "0,10,20", "--schemes", "faao,mrt", "--out", path.parent)
-    with files_of_at_most(2_000):  # two rows and a part of the third
-        result = run(*arguments, "--jobs", jobs)
+    asked = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--jobs", 1, "--out", path.parent)
+    first, second, third, _ = (whole[0] / "rows.jsonl").read_bytes().splitlines(keepends=True)
+    with files_of_at_most(len(first + second) + len(third) // 2):
+        result = run(*asked)
     assert result.exit_code == 2
     kept = path.read_bytes()
     assert kept.endswith(b"}\n")
     assert kept.count(b"\n") == 2
     (line,) = result.stderr.splitlines()
     assert f"{path}: cannot be written: File too large; the rows before are kept" in line
-    path.write_bytes(kept + kept[:700])  # where nothing could be cut back
-    with files_of_at_most(1_500):  # less than the file has: the torn row is dropped all the same
+    path.write_bytes(kept + kept[:100])  # where nothing could be cut back
+    with files_of_at_most(
+        len(first)
+    ):  # less than the file has: the torn row is dropped all the same
         assert len(load_rows(path.parent, CASES)) == 2
     assert path.read_bytes() == kept
-    assert run(*arguments, "--jobs", 1).exit_code == 0
+    assert run(*asked).exit_code == 0
     assert timeless(load_rows(path.parent, CASES)) == timeless(whole[1])
 
 
@@ -248,13 +237,13 @@ def test_rates_and_routes_are_drawn_the_same_each_time(
     name = "中 $\\frac"
     plan.write_text(edited(QUICK, {"name": name}))
     out = tmp_path / "out"
-    arguments = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--seeds", 2, "--out", out)
-    assert run(*arguments, "--jobs", 1).exit_code == 0
+    arguments = (plan, "--power", "0,10", "--seeds", 2, "--jobs", 1, "--out", out)
+    assert run(*arguments).exit_code == 0
     drawn = (out / "figure.svg").read_text()
     for text in (name, "power W of both stations, dBm", "delivered rate R_del, bit/s/Hz", "FAAO"):
         assert text in drawn
     assert (out / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert run(*arguments, "--jobs", 1).exit_code == 0
+    assert run(*arguments).exit_code == 0
     assert (out / "figure.svg").read_text() == drawn
     figure = study_figure(whole[1], parse_plan(plan.read_text()), "trajectories")
     save_figure(figure, tmp_path / "f.pdf")
@@ -263,8 +252,9 @@ def test_rates_and_routes_are_drawn_the_same_each_time(
     names = {text.get_text() for text in axes.texts}
     assert names == {"base station", "user", "start", "end"}
     failed = (StudyRow("k", {"power_dbm": 1}, "faao", 0, error="no"),)
-    with pytest.raises(InputError, match="nothing to draw"):
-        study_figure(failed, parse_plan(QUICK), "trajectories")
+    for kind, rows in (("trajectories", failed), ("delivered", whole[1][:1])):
+        with pytest.raises(InputError, match="nothing to draw"):
+            study_figure(rows, parse_plan(QUICK), kind)
 
 
 def test_what_causality_costs_is_drawn() -> None:
@@ -274,9 +264,7 @@ def test_what_causality_costs_is_drawn() -> None:
     by = {(row.values["flight.duration"], row.values["radio.causal"]): row for row in rows}
     for duration in (10, 12):
         planned, paper = by[duration, True].delivered, by[duration, False].delivered
-        assert planned is not None
-        assert paper is not None
-        assert planned >= paper - 1e-4
+        assert (planned or 0.0) >= (paper or math.inf) - 1e-4
     (plot,) = study_figure(rows, parse_plan(SMALL), "delivered").axes
     assert [line.get_label() for line in plot.lines] == [
         "R_avg, planned for it",
