@@ -16,6 +16,8 @@ from xdist.scheduler import LoadScopeScheduling
 # As the command does, and before NumPy is imported.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+from faao_mav import workflow
+from faao_mav.optimizer import optimize as solver
 from faao_mav.optimizer.search import bound
 from faao_mav.optimizer.search.map_bound import map_bound
 from faao_mav.plan import Plan, parse_plan
@@ -112,14 +114,38 @@ def paper_plan(small_plan: MakePlan) -> MakePlan:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LoadScopeScheduling:
-    """Share tests out one by one; real autopilots fly one after the other, in one process."""
+    """Share tests out one by one, but for those that share a server or fly real autopilots."""
 
     class OneFlightAtATime(LoadScopeScheduling):  # type: ignore[misc]
         def _split_scope(self, nodeid: str) -> str:
-            folder = "tests/real_autopilots/"
-            return folder if nodeid.startswith(folder) else nodeid
+            together = ("tests/real_autopilots/", "tests/app/test_app.py")
+            return next((each for each in together if nodeid.startswith(each)), nodeid)
 
     return OneFlightAtATime(config, log)
+
+
+_SOLVED: dict[object, Any] = {}
+
+
+@pytest.fixture
+def planned_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plans of the same text are solved for the first who asks."""
+
+    def once(work: Callable[..., Any]) -> Callable[..., Any]:
+        def solve(plan: Plan, *, observe: Any = None, bound: bool = False, **parts: Any) -> Any:
+            del observe
+            options = parts | ({"bound": True} if bound else {})
+            if parts:
+                return work(plan, **options)
+            asked = (work, plan.text, plan.optimizer.method, bound)
+            if asked not in _SOLVED:
+                _SOLVED[asked] = work(plan, **options)
+            return _SOLVED[asked]
+
+        return solve
+
+    monkeypatch.setattr(solver, "optimize", once(solver.optimize))
+    monkeypatch.setattr(workflow, "plan_mission", once(workflow.plan_mission))
 
 
 @pytest.fixture

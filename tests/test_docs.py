@@ -12,7 +12,6 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,26 +23,10 @@ from typer.testing import CliRunner
 import faao_mav
 from faao_mav.cli.main import app
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.plan import Plan, parse_plan, read_plan, reference
-from faao_mav.workflow import Result, plan_mission
+from faao_mav.plan import parse_plan, read_plan, reference
 
 COMMAND = Path(sys.executable).with_name("faao-mission")
-
-
-_PLANNED: dict[tuple[object, ...], Result] = {}
-
-
-@pytest.fixture(autouse=True)
-def planned_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What several pages plan is planned for the first of them."""
-
-    def plan_once(plan: Plan, **options: Any) -> Result:
-        asked = (plan.text, plan.source, *sorted(options.items()))
-        if asked not in _PLANNED:
-            _PLANNED[asked] = plan_mission(plan, **options)
-        return _PLANNED[asked]
-
-    monkeypatch.setattr("faao_mav.workflow.plan_mission", plan_once)
+pytestmark = pytest.mark.usefixtures("planned_once")
 
 
 @pytest.fixture

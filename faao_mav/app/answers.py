@@ -41,11 +41,8 @@ FILES = {
 """What can be had of a finished answer: by its name, or for what lies beside a mission what is in
 its name, what it is called, and which part of `write_part` it is."""
 
-_HEIGHT, _ABOVE = 70, 50  # pixels of a plot and of what is above it. Chosen
-_WIDE = 560  # pixels from which on two plots are side by side. Chosen
 _GREY = "#888"
-_COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c", "#8a5cd0", "#c23b6a", "#c9a227", "#4a9aa8")
-"""Of each curve, in the order of the plots, over and over."""
+_COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c")  # of the curves of a chart, in their order
 
 _MOST_DRAWN = 400  # points of a line on the map and of a chart: more cannot be told apart. Chosen
 
@@ -56,9 +53,9 @@ class Answer:
 
     `refused` is the error of a plan that cannot be used, `failed` that of one without a flight.
     `delivered` is in bit/s/Hz, `megabytes` None without a bandwidth. `drawing` has the lines of
-    the map in [latitude, longitude], and times, s, and speeds, m/s, at its places, with
-    the colours of speeds from 0 to `top`; `charts` are
-    options of ECharts. `result` is there in the finished answer only.
+    the map in [latitude, longitude], and times, s, and speeds, m/s, at its places, with the colours
+    of speeds from 0 to `top`; `charts` are options of ECharts. `result` is there in the finished
+    answer only.
     """
 
     refused: str = ""
@@ -66,7 +63,7 @@ class Answer:
     delivered: float = 0.0
     megabytes: float | None = None
     drawing: dict[str, Any] = field(default_factory=dict)
-    charts: dict[str, Any] = field(default_factory=dict)
+    charts: list[dict[str, Any]] = field(default_factory=list)
     velocities: Real | None = None
     result: Result | None = None
 
@@ -150,75 +147,46 @@ def thinned(values: Real) -> Real:
     return np.asarray(values[kept])
 
 
-def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> dict[str, Any]:
+def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> list[dict[str, Any]]:
     """Return the charts of `flight` over time, s, with what arrives `under` shadowing."""
-    plots = _plots(flight, under)
-    axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
-            "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
-    ys: list[dict[str, Any]] = []
-    curves: list[dict[str, Any]] = []
-    for k, (values, unit) in enumerate(plots):
-        colours = (2 * _COLOURS)[len(curves) :]
-        title = ", ".join(f"{{c{n}|━}} {name}" for n, name in enumerate(values))
-        marks = {f"c{n}": {"color": colours[n], "fontWeight": "bold"} for n in range(len(values))}
-        ys.append({**axis, "gridIndex": k, "min": 0, "nameGap": 10, "name": f"{title}, {unit}",
-                   "nameTextStyle": {"align": "left", "color": _GREY, "rich": marks}})  # fmt: skip
-        for name, curve in values.items():
-            points = thinned(np.stack([flight.t, curve], axis=1)).round(4).tolist()
-            curves.append({"type": "line", "name": name, "xAxisIndex": k, "yAxisIndex": k,
-                           "showSymbol": False, "data": points})  # fmt: skip
-    return {
-        "baseOption": {
-            "animation": False,
-            "color": _COLOURS,
-            "tooltip": {"trigger": "axis", "confine": True},
-            "axisPointer": {"link": [{"xAxisIndex": "all"}]},
-            "xAxis": [{**axis, "gridIndex": k, "max": "dataMax"} for k in range(len(plots))],
-            "yAxis": ys,
-            "series": curves,
-        },
-        "media": [
-            {"query": {"maxWidth": _WIDE}, "option": {"grid": _grids(len(plots), 1)}},
-            {"option": {"grid": _grids(len(plots), 2)}},
-        ],
-    }
-
-
-def heights(charts: dict[str, Any]) -> str:
-    """Return the height of all `charts` as CSS: in one column, and in two."""
-    plots, row = len(charts["baseOption"]["xAxis"]), _HEIGHT + _ABOVE
-    return f"--narrow: {plots * row}px; --wide: {-(-plots // 2) * row}px"
-
-
-def _plots(
-    flight: RoughFlight | Solution, under: Shadowed | None
-) -> list[tuple[dict[str, Real], str]]:
-    """Return the curves of each plot by name, and their unit."""
     plan, relayed = flight.plan, flight.relayed
     held, unit = of_a_slot(plan)
     arrived = {"delivered": held * np.cumsum(relayed.forwarded)}
     if under is not None and plan.radio.causal:
         parts = {"more in 9 of 10": 0.1, "more in 1 of 10": 0.9}
         arrived |= {name: held * under.arrived[part] for name, part in parts.items()}
-    plots = [
-        ({"base station to UAV": flight.I_U, "UAV to user": flight.I_G}, "bit/s/Hz"),
-        ({"queue": held * relayed.queue}, unit),
-        (arrived, unit),
-        ({"speed": lengths(flight.v)}, "m/s"),
+    plots: list[tuple[str, dict[str, Real]]] = [
+        ("bit/s/Hz", {"base station to UAV": flight.I_U, "UAV to user": flight.I_G}),
+        (unit, {"queue": held * relayed.queue}),
+        (unit, arrived),
+        ("m/s", {"speed": lengths(flight.v)}),
     ]
     velocity = np.pad(flight.v, ((0, 0), (0, 1)))
     if (use := energy_use(plan, flight.t, velocity, plan.wind)) is not None:
-        plots += [({"power": use.power}, "W"), ({"energy": use.used}, "Wh")]
-    return plots
+        plots += [("W", {"power": use.power}), ("Wh", {"energy": use.used})]
+    return [_chart(flight.t, *each) for each in plots]
 
 
-def _grids(count: int, columns: int) -> list[dict[str, object]]:
-    share = 100 // columns
-    return [
-        {"left": f"{k % columns * share + 6}%", "width": f"{share - 9}%", "height": _HEIGHT,
-         "top": k // columns * (_HEIGHT + _ABOVE) + _ABOVE - 22}
-        for k in range(count)
-    ]  # fmt: skip
+def _chart(t: Real, unit: str, curves: dict[str, Real]) -> dict[str, Any]:
+    axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
+            "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
+    titled = {"name": unit, "nameGap": 8, "nameTextStyle": {"align": "left", "color": _GREY}}
+    points = {name: np.stack([t, curve], axis=1) for name, curve in curves.items()}
+    return {
+        "animation": False,
+        "color": _COLOURS,
+        "tooltip": {"trigger": "axis", "confine": True},
+        "legend": {"top": 0, "right": 10, "icon": "roundRect", "itemHeight": 4,
+                   "textStyle": {"color": _GREY}},
+        "grid": {"left": 45, "right": 15, "top": 30, "bottom": 22},
+        "xAxis": {**axis, "max": "dataMax"},
+        "yAxis": {**axis, **titled, "min": 0},
+        "series": [
+            {"type": "line", "name": name, "showSymbol": False,
+             "data": thinned(curve).round(4).tolist()}
+            for name, curve in points.items()
+        ],
+    }  # fmt: skip
 
 
 def made(result: Result, wanted: str) -> tuple[str, bytes]:

@@ -40,6 +40,7 @@ export default {
     await loadResource(`${window.path_prefix}${this.resourcePath}/leaflet/leaflet.css`);
     this.map = L.map(this.$el.firstElementChild, { zoomSnap: 0.25, doubleClickZoom: false, center: [0, 0], zoom: 2 });
     this.map.attributionControl.setPrefix(false);
+    this.map.on("mousemove", ({ latlng }) => this.map.attributionControl.setPrefix(`${latlng.lat.toFixed(6)}, ${latlng.lng.toFixed(6)}`));
     L.control.scale({ imperial: false }).addTo(this.map);
     const group = () => L.layerGroup().addTo(this.map);
     Object.assign(this, { zones: group(), route: group(), dots: group(), marks: group(), handles: group() });
@@ -47,7 +48,6 @@ export default {
     this.aircraft = L.marker([0, 0], { icon: icon("aircraft", "✈"), interactive: false, zIndexOffset: 900 });
     this.vehicle = L.marker([0, 0], { icon: icon("vehicle", "Vehicle"), interactive: false, zIndexOffset: 950 });
     this.track = L.polyline([], { className: "flown", interactive: false });
-    this.map.on("mousemove", (e) => this.tell("cursor", { at: pair(e.latlng) }));
     this.map.on("click", (e) => (this.drawing ? this.corner(e.latlng) : this.select(null)));
     this.map.on("dblclick", () => this.finish());
     this.map.on("zoomend", () => this.show_waypoints());

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import nicegui
-import numpy as np
 from nicegui import events, ui
 
-from faao_mav.app.answers import FILES, Answer, heights, made
+from faao_mav.app.answers import FILES, Answer, made
 from faao_mav.app.document import Document, problems_of
 from faao_mav.app.panels import Fly, Form, Results, fields
 from faao_mav.app.scene import STATIONS, Scene
@@ -21,14 +20,11 @@ from faao_mav.plan.yaml_text import MAX_CHARACTERS
 TILES = "https://tile.openstreetmap.org"
 """Where the background map comes from, if it is switched on."""
 
-_HINTS = {
-    ("circle", "o_circle"): "Click the center, then the edge; Esc ends.",
-    ("polygon", "o_hexagon"): "Click the corners, the last one twice; Esc ends.",
-}
-"""How a zone of a shape, which a button with an icon begins, is drawn."""
-
-_OTHER_SHADE = "() => emit(!document.body.classList.contains('body--dark'))"
-"""Tells whether the page is to be dark, where it is now light."""
+_SHAPES = (
+    ("circle", "o_circle", "Click the center, then the edge; Esc ends."),
+    ("polygon", "o_hexagon", "Click the corners, the last one twice; Esc ends."),
+)
+"""Shape of a zone, icon of the button that begins one, and how it is drawn."""
 
 _STATES = {
     "computing": "computing",
@@ -47,7 +43,7 @@ class PlannerMap(ui.element, component="map.js", esm={"nicegui-leaflet": str(_LE
     """Leaflet with the plan's stations, ends, zones and flight; what it does is in map.js.
 
     Events: `ready`; `moved` (key, at, done); `zone` (key, inclusion, corners or center and radius,
-    done); `removed` (key); `cursor` (at). Methods by `run_method`: those of map.js.
+    done); `removed` (key). Methods by `run_method`: those of map.js.
     """
 
     def __init__(self) -> None:
@@ -71,7 +67,7 @@ class Page:
     def build(self) -> None:
         """Make the elements of the page."""
         ui.add_css(files("faao_mav.app").joinpath("page.css").read_text(encoding="utf-8"))
-        self._dark = ui.dark_mode(None)
+        ui.dark_mode(None)
         self._bar()
         with ui.element("main").classes("planner"):
             with ui.element("section").classes("left"):
@@ -98,24 +94,18 @@ class Page:
                 ui.menu_item("Plan (.yaml)", self._download_plan)
                 for wanted, (label, _) in FILES.items():
                     ui.menu_item(label, partial(self._download, wanted))
-            # only the browser knows which of both it shows until one is chosen
-            _button("dark_mode", "Light or dark").on(
-                "click", lambda e: self._dark.set_value(e.args), js_handler=_OTHER_SHADE
-            )
 
     def _map_part(self) -> None:
         self._map = PlannerMap()
         call = self._map.run_method
         with ui.element("div").classes("tools"):
-            for inside, name in ((False, "Stay out"), (True, "Stay in")):
+            for inside, name in ((False, "Stay out of"), (True, "Stay in")):
                 with ui.element("div").classes("in" if inside else "out"):
                     ui.label(name)
-                    for (shape, icon), hint in _HINTS.items():
-                        tip = f"{name} a {shape}" if inside else f"{name} of a {shape}"
+                    for shape, icon, how in _SHAPES:
                         draw = partial(call, "draw", shape, inside)
-                        _button(icon, tip, draw, partial(self._hint, hint))
+                        _button(icon, f"{name} a {shape}", draw, partial(ui.notify, how))
             _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
-            _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
             shown = ui.switch(
                 "Background",
                 on_change=lambda e: call("background", self._background if e.value else None),
@@ -125,13 +115,12 @@ class Page:
                               f"from {TILES.removeprefix('https://')}")  # fmt: skip
         self._map.move(target_index=-1)
         self._map.on("ready", self._ready).on("moved", self._moved).on("zone", self._moved)
-        self._map.on("removed", self._removed).on("cursor", lambda e: self._cursor(e.args["at"]))
-        self._where = ui.label("Drag the stations and the ends, or draw zones.").classes("where")
+        self._map.on("removed", self._removed)
         with ui.element("div").classes("time"):
             self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
             self._slider.props('aria-label="Time of the flight"')
             self._now = ui.label().classes("now")
-        self._chart, self._height = ui.echart({}).classes("charts"), ""
+        self._chart_box, self._charts = ui.element("div").classes("charts"), list[ui.echart]()
 
     def _side_part(self) -> None:
         self._failed = ui.label().classes("failed").props('role="alert"')
@@ -180,27 +169,37 @@ class Page:
             self._rate.text = ""
             self._say("refused" if problems else "failed")
             self._map.run_method("clear_flight")
-            self._chart.run_chart_method("clear")
+            self._draw_charts()
             self._results.clear()
             self._at_time()
             return
         data = "" if answer.megabytes is None else f", {answer.megabytes:,.1f} MB"
         self._rate.text = f"{answer.delivered:.4f} bit/s/Hz{data}"
         self._rate.props["data-delivered"] = repr(answer.delivered)
-        self._say("finished" if answer.result is not None else "rough")
+        self._say("rough" if answer.result is None else "finished")
         self._map.run_method("flight", answer.drawing)
-        if (height := heights(answer.charts)) != self._height:  # other plots than before
-            self._height = height
-            self._chart.style(replace=height)
-        # behind the route, which is to be drawn first
-        self._chart.run_chart_method("setOption", answer.charts, True)
+        self._draw_charts()
         self._slider.props["max"] = len(answer.drawing["times"]) - 1
         self._slider.update()
         self._at_time()
         if answer.result is not None:
             self._results.show(answer.result)
-            document = self._document
-            self._fly.show(answer.result, document.path if document.saved else None)
+            self._show_flight_to_fly()
+
+    def _show_flight_to_fly(self) -> None:
+        document = self._document
+        self._fly.show(self._answer.result, document.path if document.saved else None)
+
+    def _draw_charts(self) -> None:
+        """Draw the charts of the answer: on those that are there, as new ones take longer."""
+        charts = self._answer.charts
+        if len(charts) == len(self._charts):
+            for shown, chart in zip(self._charts, charts, strict=True):
+                shown.run_chart_method("setOption", chart, True)
+            return
+        self._chart_box.clear()
+        with self._chart_box:
+            self._charts = [ui.echart(chart) for chart in charts]
 
     def _draw_scene(self, *, fit: bool = False) -> None:
         scene = Scene(self._document)
@@ -212,7 +211,6 @@ class Page:
         gesture = (told["key"], self._gestures)
         if told["key"] in STATIONS:
             scene.move(told["key"], told["at"], gesture)
-            self._cursor(told["at"])
         else:
             scene.change(told, gesture)
         self._gestures += bool(told["done"])
@@ -222,29 +220,11 @@ class Page:
         Scene(self._document).remove(event.args["key"])
         self._changed()
 
-    def _cursor(self, at: list[float]) -> None:
-        scene = Scene(self._document)
-        if (frame := scene.frame) is None:
-            return
-        here = frame.to_local(*at)
-        text = f"{here[0]:.1f} m east, {here[1]:.1f} m north ({at[0]:.6f}, {at[1]:.6f})"
-        for station in scene.stations():
-            if station["key"] in ("base", "user"):
-                apart = np.hypot(*(here - frame.to_local(*station["at"])))
-                text += f"; {station['label'].lower()} {apart:.0f} m"
-        self._hint(text)
-
-    def _hint(self, text: str) -> None:
-        self._where.text = text
-
     def _at_time(self) -> None:
         drawn, k = self._answer.drawing, int(self._slider.value)
         flown = 0 < k < len(drawn.get("times", ()))
         self._map.run_method("place_aircraft", drawn["places"][k] if flown else None)
         self._now.text = f"{drawn['times'][k]:.1f} s, {drawn['speeds'][k]:.2f} m/s" if flown else ""
-        if flown:
-            tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": k}
-            self._chart.run_chart_method("dispatchAction", tip)
 
     def _key(self, event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):
@@ -282,8 +262,7 @@ class Page:
             _complain(error)
             return
         self._save_button.set_enabled(False)
-        if self._answer.result is not None:
-            self._fly.show(self._answer.result, path)
+        self._show_flight_to_fly()
         ui.notify(f"{path.name} saved", type="positive")
 
     def _download_plan(self) -> None:

@@ -15,8 +15,8 @@ from faao_mav.app.vehicle import MISSION, debriefed, fly_command, uploaded, watc
 from faao_mav.app.workers import Workers, said, talk
 from faao_mav.fly.fly import as_text
 from faao_mav.plan.keys import PlanKey, reference
+from faao_mav.report.page import facts
 from faao_mav.report.summary import result_lines
-from faao_mav.validate import Finding
 from faao_mav.validate.rule import by_rule, message_of
 from faao_mav.workflow import Result
 
@@ -44,16 +44,13 @@ class Form:
 
     def __init__(self, document: Document, changed: Callable[[], None]) -> None:
         self._document, self._changed = document, changed
-        self._keys: dict[str, list[PlanKey]] = {}  # by their section
-        for key in fields():
-            self._keys.setdefault(_section(key.path), []).append(key)
         self._inputs: dict[str, ui.input | ui.select] = {}
         self._sections: dict[str, ui.expansion] = {}
         self._problems: Mapping[str, str] = {}
 
     def build(self) -> None:
         """Make one panel for each section of the file, with the fields of the first ones."""
-        for section in self._keys:
+        for section in dict.fromkeys(_section(key.path) for key in fields()):
             panel = ui.expansion(section or "plan").classes("w-full section")
             panel.props("dense header-class=section-head")
             panel.on_value_change(partial(self._open, section))
@@ -62,7 +59,7 @@ class Form:
             self._sections[section].open()
 
     def _open(self, section: str) -> None:
-        keys = self._keys[section]
+        keys = [key for key in fields() if _section(key.path) == section]
         if keys[0].path in self._inputs:
             return
         with self._sections[section]:
@@ -91,8 +88,7 @@ class Form:
 
     def _field(self, key: PlanKey) -> ui.input | ui.select:
         path = tuple(key.path.split("."))
-        name = path[-1]
-        label = f"{name}, {key.unit}" if key.unit else name
+        label = f"{path[-1]}, {key.unit}" if key.unit else path[-1]
         default = "Required." if key.required else f"Default: {key.default or 'none'}."
 
         def commit() -> None:
@@ -118,7 +114,7 @@ class Results:
     def __init__(self, focus: Callable[[list[float]], object]) -> None:
         self._focus = focus
         with ui.tab_panel("Result"):
-            self._facts = ui.element("dl").classes("facts")
+            self._facts = ui.element("div").classes("facts")
         with ui.tab_panel("Findings"):
             self._findings = ui.column().classes("findings")
 
@@ -136,10 +132,8 @@ class Results:
         """Show what is to be said of `result` in the place of what was."""
         self.clear()
         with self._facts:
-            for line in result_lines(result):
-                for tag, words in zip(("dt", "dd"), line, strict=True):
-                    with ui.element(tag):
-                        ui.label(str(words))
+            ui.html(facts(result_lines(result)), sanitize=False)  # all in it is escaped
+        items = result.conversion.mission.items if result.conversion is not None else ()
         with self._findings:
             if result.no_mission is not None:
                 ui.label(str(result.no_mission)).classes("finding error")
@@ -149,18 +143,12 @@ class Results:
                 with ui.element("div").classes(f"finding {group[0].level}"):
                     ui.label(f"{group[0].level}: {message_of(group)}")
                     ui.label(group[0].action).classes("about")
-                    for number, place in _places(result, group).items():
-                        show = partial(self._focus, place)
+                    for number in dict.fromkeys(each.item for each in group):
+                        if number is None or not (items[number - 1].x or items[number - 1].y):
+                            continue
+                        show = partial(self._focus, [items[number - 1].x, items[number - 1].y])
                         button = ui.button(f"item {number}", on_click=show)
                         button.props("flat dense no-caps icon=place")
-
-
-def _places(result: Result, group: list[Finding]) -> dict[int, list[float]]:
-    """Return [latitude, longitude] of the items that the findings `group` are about, by number."""
-    assert result.conversion is not None
-    items = result.conversion.mission.items
-    found = {n: items[n - 1] for n in (each.item for each in group) if n is not None}
-    return {n: [item.x, item.y] for n, item in found.items() if item.x or item.y}
 
 
 def _section(path: str) -> str:
@@ -196,8 +184,9 @@ class Fly:
             )
             self._connection.classes("w-full")
             with ui.row().classes("mt-2 gap-2"):
-                self._upload_button = _button("Upload and verify", lambda: self._begin(uploaded))
-                self._watch_button = _button("Watch", self._watch)
+                upload, watch = (partial(self._begin, work) for work in (uploaded, watched))
+                self._upload_button = _button("Upload and verify", upload)
+                self._watch_button = _button("Watch", watch)
                 self._leave_button = _button("Leave", self._interrupt.set)
             self._stands = ui.label().classes("uploaded stands")
             self._told = ui.label().classes("uploaded").props('aria-live="polite"')
@@ -206,7 +195,7 @@ class Fly:
                 ui.label(_HOW).classes("about")
                 self._command = ui.label().classes("command")
                 with ui.row().classes("gap-2"):
-                    _button(f"Download {MISSION}", lambda: download(MISSION))
+                    _button(f"Download {MISSION}", partial(download, MISSION))
                     _button("Copy", lambda: ui.clipboard.write(self._command.text))
             ui.separator().classes("my-3")
             self._log = ui.upload(
@@ -241,6 +230,8 @@ class Fly:
             asked = (self._result, str(self._connection.value))
             self._task = asyncio.create_task(self._until_done(work, *asked))
             self._stands.text = self._told.text = ""
+            if work is watched:
+                self._draw("flown", [])
             self._enable()
 
     async def _until_done(self, work: Callable[..., str], *asked: object) -> None:
@@ -255,10 +246,6 @@ class Fly:
     def _tell(self, text: str) -> None:
         lines = [*self._told.text.splitlines(), *text.splitlines()]
         self._told.text = "\n".join(lines[-_MOST_LINES:])
-
-    def _watch(self) -> None:
-        self._draw("flown", [])
-        self._begin(watched)
 
     def _hear(self, told: dict[str, Any]) -> None:
         if "note" in told:

@@ -48,7 +48,7 @@ class Scene:
         found = []
         for name in _ZONES:
             for k, value in enumerate(self._zones(name)):
-                held = value if isinstance(value, dict) else {"polygon": value}
+                held = value if isinstance(value, dict) else {}
                 zone = {"key": f"{name}/{k}", "inclusion": name == "inclusion"}
                 ring, at = held.get("polygon"), self._degrees(held.get("center"))
                 corners = [self._degrees(each) for each in ring] if isinstance(ring, list) else []
@@ -90,11 +90,8 @@ class Scene:
             value = {"polygon": [self._metres(each) for each in told["corners"]]}
         if zones and zones == self._document.value(path):
             self._document.put((*path, k), value, gesture)
-        elif k < len(zones):
-            self._document.put(path, value["polygon"], gesture)
-        else:  # the short form holds one polygon only
-            rings = [{"polygon": ring} for ring in zones]
-            self._document.put(path, [*rings, value], gesture)
+        else:  # the short form, which holds one polygon only, becomes a list
+            self._document.put(path, [*zones[:k], value, *zones[k + 1 :]], gesture)
 
     def remove(self, key: str) -> None:
         """Take a zone out, if it is there, and the whole fence with its last."""
@@ -108,12 +105,12 @@ class Scene:
         self._document.remove(path)
 
     def _zones(self, name: str) -> list[Any]:
-        """Return the zones of a list; its short form is the corners of the only one."""
+        """Return the zones of a list, whose short form is the corners of the only one."""
         value = self._document.value(("fence", name))
         if not isinstance(value, list) or not value:
             return []
         listed = any(isinstance(each, dict) and "latitude" not in each for each in value)
-        return value if listed else [value]
+        return value if listed else [{"polygon": value}]
 
     def _number(self, key: str) -> int | None:
         """Return the number of the zone in its list; None where it is no longer there."""

@@ -73,11 +73,11 @@ def result_lines(result: Result, *, timed: bool = True) -> Iterator[Line]:
     yield from _rates(result)
     yield from _optimum(result, timed)
     yield from _mission(result)
-    wind = plan.site.wind
-    told = (
-        [f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees"] if wind.speed else []
-    )
-    told += [f"gusts of {wind.gust:g} m/s"] if wind.gust > wind.speed else []
+    wind, told = plan.site.wind, list[str]()
+    if wind.speed:
+        told.append(f"planned for {wind.speed:g} m/s from {wind.from_degrees:g} degrees")
+    if wind.gust > wind.speed:
+        told.append(f"gusts of {wind.gust:g} m/s")
     if told:
         yield "wind", "; ".join(told)
     yield from _moving(solution, result.check)
@@ -259,7 +259,6 @@ def _goal(solution: Solution) -> Iterator[Line]:
 
 
 def _height(solution: Solution) -> Iterator[Line]:
-    """Yield which height was chosen, and what both ends of the choice would bring."""
     if (found := solution.height) is None:
         return
     low, high = (
@@ -290,7 +289,6 @@ def _asked(plan: Plan, rate: float) -> str:
 
 
 def _moving(solution: Solution, check: Check | None) -> Iterator[Line]:
-    """Yield how stations move, and what it costs to meet them late."""
     told = []
     for name, station in zip(("base", "user"), solution.plan.radio.stations, strict=True):
         if station.moves:
@@ -306,7 +304,6 @@ def _moving(solution: Solution, check: Check | None) -> Iterator[Line]:
 
 
 def _energy(check: Check | None) -> Iterator[Line]:
-    """Yield what the whole predicted flight takes, and what of the battery it leaves."""
     if check is None or (energy := check.energy) is None:
         return
     told = f"{energy.total:.4g} Wh for the whole flight"
@@ -332,7 +329,6 @@ def _fenced(result: Result) -> Iterator[Line]:
 
 
 def _told_rate(rate: float, bandwidth_mhz: float | None) -> str:
-    """Return `rate`, bit/s/Hz, as text, with a bandwidth in Mbit/s too."""
     megabits = "" if bandwidth_mhz is None else f" ({rate * bandwidth_mhz:.4g} Mbit/s)"
     return f"{rate:.4f} bit/s/Hz{megabits}"
 
@@ -348,6 +344,5 @@ def _megabytes(amount: float | None) -> str:
 
 
 def _apart(rms: float, most: float, path: float) -> str:
-    """Say how far, m, a flight is from the plan."""
     at_equal_times = f"{rms:.1f} m rms from the plan at equal times, {most:.1f} m at most"
     return f"{at_equal_times}; {path:.1f} m from its path"

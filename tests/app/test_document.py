@@ -73,7 +73,7 @@ def test_what_plans_do_not_hold_is_kept_as_text_and_told_as_the_command_line_doe
     assert str(error.value) == f"plan.yaml: flight.start: {told['flight.start']}"
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=15)
 @given(
     value=st.recursive(
         st.integers(-(10**6), 10**6)
@@ -132,13 +132,13 @@ def test_zones_are_drawn_changed_and_removed() -> None:
     assert Scene(Document(SMALL + ringless)).zones() == []
 
 
-def test_the_short_form_of_an_inclusion_becomes_a_list_with_a_second_one() -> None:
+def test_the_short_form_of_an_inclusion_becomes_a_list_when_it_is_changed() -> None:
     document = Document((MISSIONS / "fenced_relay.yaml").read_text())
     scene = Scene(document)
     (first, *_) = scene.zones()
     assert first["key"] == "inclusion/0"
     scene.change(first, None)
-    assert len(document.value(("fence", "inclusion"))) == 4
+    assert [len(zone["polygon"]) for zone in document.value(("fence", "inclusion"))] == [4]
     scene.change({**first, "key": None}, None)
     assert [len(zone["polygon"]) for zone in document.value(("fence", "inclusion"))] == [4, 4]
     assert parse_plan(document.text).zones[0].inclusion

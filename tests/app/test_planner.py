@@ -99,9 +99,10 @@ def test_with_a_spread_the_finished_chart_of_what_is_delivered_tells_what_arrive
     found = answers.finished(text, "p")
     assert found.result is not None
     assert found.result.shadowed is not None
-    ends = {each["name"]: each["data"][-1][1] for each in found.charts["baseOption"]["series"]}
+    curves = [curve for chart in found.charts for curve in chart["series"]]
+    ends = {curve["name"]: curve["data"][-1][1] for curve in curves}
     quantiles = found.result.shadowed.quantiles
     for name, rate in (("more in 9 of 10", quantiles[0.1]), ("more in 1 of 10", quantiles[0.9])):
         assert ends[name] == pytest.approx(10 * rate, abs=1e-3)
-    rough = answers.rough(text, "p", None).charts["baseOption"]["series"]
-    assert [each["name"] for each in rough] == [name for name in ends if "of 10" not in name]
+    rough = [curve for chart in answers.rough(text, "p", None).charts for curve in chart["series"]]
+    assert [curve["name"] for curve in rough] == [name for name in ends if "of 10" not in name]
