@@ -22,7 +22,6 @@ from typer.testing import CliRunner
 
 import faao_mav
 from faao_mav.cli.main import app
-from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan, read_plan, reference
 
 COMMAND = Path(sys.executable).with_name("faao-mission")
@@ -161,7 +160,7 @@ def test_the_sample_plans_have_the_rates_of_the_table(row: str) -> None:
     plan = read_plan(ROOT / name.split("`")[0])
     if "--method direct" in name:
         plan = plan.changed({"optimizer.method": "direct"})
-    solution = optimize(plan)
+    solution = faao_mav.optimize(plan)
     reached = f"{solution.history[0]:.4f} {solution.history[-1]:.4f}"
     assert difference(f"{start} {best.split()[0]}", reached) is None
 

@@ -3,18 +3,29 @@
 import re
 import subprocess
 import sys
+from ast import literal_eval
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
-import pytest
 from conftest import FLYABLE
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-_PROGRAM = """import sys
+_PROGRAM = """import shlex, sys
 sys.modules.update(dict.fromkeys({}))  # these can neither be imported nor found
-from faao_mav.cli.main import run
-run()"""
+from typer.testing import CliRunner
+from faao_mav.cli.main import app
+for line in sys.stdin:
+    done = CliRunner().invoke(app, shlex.split(line))
+    print((done.exit_code, done.stdout, done.stderr))"""
+
+MISSING = {
+    "app plan.yaml --no-browser": "app",
+    "debrief flight.ulg --plan plan.yaml": "debrief",
+    "link --terrain dem.tif --frequency 900 --station 1,2,3": "maps",
+    "study plan.yaml --cluster tcp://127.0.0.1:9 --out rows": "cluster",
+}
+"""Commands, and the extra that each needs."""
 
 
 def required() -> set[str]:
@@ -30,40 +41,29 @@ def required() -> set[str]:
     return found
 
 
-def without_extras(folder: Path, *arguments: object) -> "subprocess.CompletedProcess[str]":
-    """Run the command as if nothing that only an extra brings were installed."""
+def test_a_plan_needs_no_extra_and_one_that_is_missing_is_named_in_one_line(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "plan.yaml").write_text(FLYABLE)
+    (tmp_path / "flight.ulg").write_bytes(b"ULog")
+    (tmp_path / "dem.tif").write_bytes(b"II*")
     kept = required()
     absent = [
         module
         for module, owners in packages_distributions().items()
         if not kept & {canonicalize_name(owner) for owner in owners}
     ]
-    command = [sys.executable, "-c", _PROGRAM.format(absent), *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-
-
-def test_a_plan_needs_no_extra(tmp_path: Path) -> None:
-    (tmp_path / "plan.yaml").write_text(FLYABLE)
-    done = without_extras(tmp_path, "plan.yaml", "--out", "m.plan", "--report", "r.html", "--quiet")
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-@pytest.mark.parametrize(
-    ("extra", "arguments"),
-    [
-        ("app", "app plan.yaml --no-browser"),
-        ("app", "app --no-browser"),
-        ("debrief", "debrief flight.ulg --plan plan.yaml"),
-        ("maps", "link --terrain dem.tif --frequency 900 --station 1,2,3"),
-        ("cluster", "study plan.yaml --cluster tcp://127.0.0.1:9 --out rows"),
-    ],
-)
-def test_a_missing_extra_is_named_in_one_line(extra: str, arguments: str, tmp_path: Path) -> None:
-    (tmp_path / "plan.yaml").write_text(FLYABLE)
-    (tmp_path / "flight.ulg").write_bytes(b"ULog")
-    (tmp_path / "dem.tif").write_bytes(b"II*")
-    done = without_extras(tmp_path, *arguments.split())
-    said = rf"faao-mission: [^\n]* needs \w+, which is not installed: pip install '\.\[{extra}\]'"
-    assert re.fullmatch(rf"{said} in a checkout of faao-mav\n", done.stderr), done.stderr
-    assert (done.returncode, done.stdout) == (2, "")
+    commands = ["plan.yaml --out m.plan --report r.html --quiet", *MISSING]
+    ran = subprocess.run(
+        [sys.executable, "-c", _PROGRAM.format(absent)], input="\n".join(commands), text=True,
+        cwd=tmp_path, capture_output=True, check=True,
+    )  # fmt: skip
+    whole, *rest = map(literal_eval, ran.stdout.splitlines())
+    assert whole == (0, "", "")
+    assert (tmp_path / "m.plan").exists()
+    for (status, told, error), extra in zip(rest, MISSING.values(), strict=True):
+        said = r"faao-mission: [^\n]* needs \w+, which is not installed: "
+        said += rf"pip install '\.\[{extra}\]' in a checkout of faao-mav\n"
+        assert re.fullmatch(said, error), error
+        assert (status, told) == (2, "")
     assert not (tmp_path / "rows").exists()
