@@ -175,7 +175,8 @@ def _chart(t: Real, unit: str, curves: dict[str, Real]) -> dict[str, Any]:
     return {
         "animation": False,
         "color": _COLOURS,
-        "tooltip": {"trigger": "axis", "confine": True},
+        "tooltip": {"trigger": "axis", "confine": True, "padding": 4,
+                    "textStyle": {"fontSize": 11}},
         "legend": {"top": 0, "right": 10, "icon": "roundRect", "itemHeight": 4,
                    "textStyle": {"color": _GREY}},
         "grid": {"left": 45, "right": 15, "top": 30, "bottom": 22},

@@ -117,7 +117,7 @@ class Page:
         self._map.on("ready", self._ready).on("moved", self._moved).on("zone", self._moved)
         self._map.on("removed", self._removed)
         with ui.element("div").classes("time"):
-            self._slider = ui.slider(min=0, max=1, value=0, on_change=self._at_time)
+            self._slider = ui.slider(min=0, max=1, value=0, on_change=self._slid)
             self._slider.props('aria-label="Time of the flight"')
             self._now = ui.label().classes("now")
         self._chart_box, self._charts = ui.element("div").classes("charts"), list[ui.echart]()
@@ -225,6 +225,12 @@ class Page:
         flown = 0 < k < len(drawn.get("times", ()))
         self._map.run_method("place_aircraft", drawn["places"][k] if flown else None)
         self._now.text = f"{drawn['times'][k]:.1f} s, {drawn['speeds'][k]:.2f} m/s" if flown else ""
+
+    def _slid(self) -> None:
+        self._at_time()
+        tip = {"type": "showTip", "seriesIndex": 0, "dataIndex": int(self._slider.value)}
+        for chart in self._charts:
+            chart.run_chart_method("dispatchAction", tip)
 
     def _key(self, event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):
