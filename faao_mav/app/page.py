@@ -106,6 +106,7 @@ class Page:
                         draw = partial(call, "draw", shape, inside)
                         _button(icon, f"{name} a {shape}", draw, partial(ui.notify, how))
             _button("delete", "Delete the chosen zone (Del)", partial(call, "remove_selected"))
+            _button("center_focus_strong", "Show all", partial(self._draw_scene, fit=True))
             shown = ui.switch(
                 "Background",
                 on_change=lambda e: call("background", self._background if e.value else None),

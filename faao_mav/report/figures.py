@@ -37,7 +37,7 @@ class Shown(NamedTuple):
 
 
 class _Plot(NamedTuple):
-    """A plot over time: what it shows with the unit, and by their names curves.
+    """A plot over time, s: what it shows with the unit, and by their names curves.
 
     A curve is its times and values; `limits` are values that the curves are to keep; a `band` has
     its name, its times, and the values between which it lies.
@@ -47,7 +47,6 @@ class _Plot(NamedTuple):
     curves: Mapping[str, tuple[Real, Real]]
     limits: Mapping[str, float] = MappingProxyType({})
     band: tuple[str, Real, Real, Real] | None = None
-    over: str = "time, s"
 
 
 def flight_figure(
@@ -143,10 +142,9 @@ def plan_figures(result: Result, log: "FromLog | None" = None) -> Iterator[Shown
         title = f"What has arrived over time, as {rate} counts it: planned without shadowing; "
         title += "with it the median, and in the band eight of ten, one above, one below"
         yield Shown("What arrives", _figure(_arrival(solution, under)), title)
-    steps = np.arange(float(len(solution.history)))
-    reached = _Plot(f"rate {rate}, bit/s/Hz", {"": (steps, solution.history)}, over="iteration")
-    title = f"{rate} after each iteration, from {solution.history[0]:.4f} to "
-    yield Shown("Convergence", _figure(reached), f"{title}{solution.history[-1]:.4f} bit/s/Hz")
+    begun, ended = solution.history[0], solution.history[-1]
+    title = f"{rate} after each iteration, from {begun:.4f} to {ended:.4f} bit/s/Hz"
+    yield Shown("Convergence", _convergence(solution), title)
     title = "Power on each stream over time, base station and UAV, strongest stream first"
     yield Shown("Precoders", _precoder_power(solution), title)
 
@@ -177,6 +175,20 @@ def _precoder_power(solution: Solution) -> "Figure":
         curves = {f"stream {k}": (solution.t, each) for k, each in enumerate(streams.T, 1)}
         plots.append(_Plot(f"{station}, W", curves, {limit: power}))
     return _figure(*plots)
+
+
+def _convergence(solution: Solution) -> "Figure":
+    """Return the rate that the plan maximises, R_avg or R_del, after each iteration."""
+    from matplotlib.ticker import MaxNLocator
+
+    with drawing(WIDTH, 2.6) as figure:
+        plot = figure.subplots()
+        steps = np.arange(len(solution.history))
+        plot.plot(steps, solution.history, color=SERIES[0], marker="o", markersize=3.5)
+        plot.xaxis.set_major_locator(MaxNLocator(integer=True))
+        plot.ticklabel_format(axis="y", useOffset=False)
+        label(plot, "", "iteration", f"rate {solution.plan.radio.maximised}, bit/s/Hz")
+    return figure
 
 
 def of_a_slot(plan: Plan) -> tuple[float, str]:
@@ -245,7 +257,7 @@ def _draw(column: "list[Axes]", *plots: _Plot) -> None:
                 line.set(linewidth=1.1 if k else 3.6, alpha=None if k else 0.45)
         axes.set_ylim(bottom=min(0.0, axes.dataLim.y0))
         last = axes is column[-1]
-        label(axes, "", plot.over if last else "", plot.what)
+        label(axes, "", "time, s" if last else "", plot.what)
         axes.tick_params(labelbottom=last)
         if ("" not in plot.curves or plot.limits) and len(plot.curves) <= len(SERIES):
             legend_above(axes)

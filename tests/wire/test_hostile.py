@@ -21,7 +21,7 @@ from faao_mav.mission.formats.wpl import write_wpl
 from faao_mav.sim import MockAutopilot, MockKind
 from faao_mav.wire import messages, upload
 from faao_mav.wire.codec import Codec
-from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
+from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MavResult, MissionType
 from faao_mav.wire.wire_items import mission_of
 
 NAN, INF = math.nan, math.inf
@@ -105,21 +105,34 @@ def test_an_upload_that_is_ended_from_outside_is_cancelled(tmp_path: Path) -> No
     assert [ack.type for ack in cancelled] == [MavResult.OPERATION_CANCELLED]
 
 
-def test_a_mission_goes_on_when_its_terminal_has_gone(tmp_path: Path) -> None:
-    """A lost SSH session hangs up."""
+class _Told(MockAutopilot):
+    """It notes the orders that it is given."""
+
+    def _receive(self, envelope: messages.Envelope, now: float) -> Any:
+        told = envelope.message
+        if isinstance(told, messages.CommandLong) and told.command < MavCommand.SET_INTERVAL:
+            self.orders = [*getattr(self, "orders", []), told.command]
+        return super()._receive(envelope, now)
+
+
+@pytest.mark.parametrize("hung_up", [True, False])
+def test_a_mission_goes_on_when_nobody_can_be_told_any_more(tmp_path: Path, hung_up: bool) -> None:
+    """A lost SSH session: a hang-up, or output that nobody reads."""
     path = tmp_path / "m.waypoints"
     path.write_text(write_wpl(a_mission(9)))
-    with vehicle("ardupilot") as (to, mock):
+    with vehicle("ardupilot", _Told) as (to, mock):
         assert upload(a_mission(9), to, system=1).verified
         arguments = ["fly", str(path), "--to", to, "--system", "1", "--arm"]
         client = command(signal.SIGHUP, arguments, stdout=subprocess.PIPE)
         assert client.stdout is not None
         assert any("the mission is under way" in line for line in client.stdout)
-        client.send_signal(signal.SIGHUP)
-        assert "the terminal has gone" in client.stdout.read()
+        if hung_up:
+            client.send_signal(signal.SIGHUP)
+            assert "the terminal has gone" in client.stdout.read()
         client.stdout.close()
         assert client.wait(timeout=PATIENCE) != 0
         assert (mock.armed, mock.mode) == (True, 3)
+        assert mock.orders == [MavCommand.ARM, MavCommand.START]
 
 
 @pytest.mark.parametrize(
