@@ -200,13 +200,6 @@ class Model(ABC):
         """
         return None
 
-    def corner_speed(self, turn: float) -> float | None:  # noqa: ARG002
-        """Return the speed, m/s, at which it passes a waypoint where it turns by `turn`, rad.
-
-        None if no such law is known.
-        """
-        return None
-
     def true_over_commanded(self, altitude: float) -> float:  # noqa: ARG002
         """Return true airspeed over the one that a mission commands, `altitude` m above the sea.
 

@@ -7,12 +7,11 @@ and the return are climbs and descents at constant speed with what the autopilot
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.model import LONGEST, FlightPath, Track
 from faao_mav.autopilot.vehicle import Vehicle
 from faao_mav.autopilot.vehicle_type import Orbit, height_above_home
@@ -82,15 +81,9 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
     index = steps = 0
     while index < len(mission.items) and steps < _MOST_STEPS:
         item, steps = mission.items[index], steps + 1
-        if item.command in JUMPS:
-            to, repeats = item.params[0], item.params[1]
-            if not (math.isfinite(to) and math.isfinite(repeats)):
-                raise InputError(
-                    f"mission item {index + 1}: {name_of(item.command)} to {to:g}, {repeats:g} "
-                    "times; expected numbers"
-                )
-            more = left.setdefault(index, _REPEATS if repeats < 0 else int(repeats))
-            target = jump_target(mission.items, index)
+        if item.command in JUMPS and math.isfinite(item.params[0]):
+            repeats, target = item.params[1], jump_target(mission.items, index)
+            more = left.setdefault(index, int(repeats) if 0 <= repeats < _MOST_STEPS else _REPEATS)
             if more > 0 and target is not None:
                 left[index] -= 1
                 index = target
@@ -140,9 +133,7 @@ class _Walk:
             case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
                 self._take_off(index, item)
             case Command.NAV_LAND | Command.NAV_VTOL_LAND:
-                ground = self._spot(index, item)[:2]
-                self._towards(index, np.array([*ground, self._last[2]]))
-                self._descend(index, ground)
+                self._land(index, self._spot(index, item)[:2])
             case Command.NAV_RETURN_TO_LAUNCH:
                 self._return(index)
             case Command.NAV_DELAY if self._type.hovers:
@@ -157,9 +148,14 @@ class _Walk:
         """Return everything flown."""
         self._fly()
         if not self._parts:
-            self._add(np.zeros(1), self._place[None], np.zeros((1, 3)), np.zeros(1))
+            self._show(0, np.zeros(1), self._place[None], np.zeros((1, 3)))
         t, position, velocity, item = map(np.concatenate, zip(*self._parts, strict=True))
         return Track(t, position, velocity, item.astype(int), self._reached, self._frame)
+
+    @property
+    def _last(self) -> Real:
+        """Where the stretch ends so far, (3,) m."""
+        return self._stretch[-1].point if self._stretch else self._place
 
     def _towards(self, index: int, goal: Real) -> None:
         """Go on to `goal` (3,), m, as the item says."""
@@ -174,11 +170,6 @@ class _Walk:
         spline = command == Command.NAV_SPLINE_WAYPOINT
         stop = _Stop(goal, index, self._speed, hold, spline, radius if own else 0.0)
         self._stretch.append(stop)
-
-    @property
-    def _last(self) -> Real:
-        """Where the stretch ends so far, (3,) m."""
-        return self._stretch[-1].point if self._stretch else self._place
 
     def _fly(self) -> None:
         """Fly the waypoints that are waiting."""
@@ -200,22 +191,20 @@ class _Walk:
         )
         self._check_clock(self._at_least(path))
         flown = self._model.fly(path, self._step)
-        end = float(flown.departures[-1])
-        kept = flown.t <= end
-        leg = np.searchsorted(flown.departures[1:], flown.t[kept], side="right")
-        place = np.array([np.interp(end, flown.t, x) for x in flown.position.T])
         self._reached[items[1:]] = self._clock + flown.departures[1:]
-        shown = items[1:][np.minimum(leg, len(items) - 2)]
-        self._add(flown.t[kept], flown.position[kept], flown.velocity[kept], shown)
-        self._clock, self._place = self._clock + end, place
+        end = flown.departures[-1]
+        t = np.append(flown.t[flown.t < end - _SHORTEST], end)
+        leg = np.searchsorted(flown.departures[1:-1], t, side="right")
+        columns = np.hstack([flown.position, flown.velocity]).T
+        samples = np.stack([np.interp(t, flown.t, column) for column in columns], axis=-1)
+        self._show(items[1:][leg], t, samples[:, :3], samples[:, 3:])
 
     def _at_least(self, path: FlightPath) -> float:
         """Return how long `path` takes without ramps, s."""
         ways = np.diff(path.points, axis=0)
         level, rise = np.hypot(ways[:, 0], ways[:, 1]) / path.speeds, ways[:, 2]
         limit = np.where(rise > 0, *map(self._changed.value, ("climb_speed", "descent_speed")))
-        legs = np.maximum(level, np.abs(rise) / limit)
-        return float(legs.sum() + np.sum(path.holds))
+        return float(np.maximum(level, np.abs(rise) / limit).sum() + np.sum(path.holds))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         self._fly()
@@ -267,10 +256,11 @@ class _Walk:
         if (waiting := self._vehicle.waiting) is not None:
             self._circle(index, place, waiting)
         else:
-            self._towards(index, place)
-            self._descend(index, place[:2])
+            self._land(index, place[:2])
 
-    def _descend(self, index: int, ground: Real) -> None:
+    def _land(self, index: int, ground: Real) -> None:
+        """Fly level to above `ground` (2,), m, and sink to it."""
+        self._towards(index, np.array([*ground, self._last[2]]))
         self._fly()
         self._go(index, np.append(ground, 0.0), self._vehicle.landing_time(self._place[2]))
         self._reached[index] = self._clock
@@ -290,16 +280,16 @@ class _Walk:
         self._check_clock(lasting)
         return np.linspace(0.0, lasting, max(2, math.ceil(lasting / self._step) + 1))
 
-    def _show(self, index: int, t: Real, position: Real, velocity: Real) -> None:
-        """Be at `position` with `velocity` (n, 3), m and m/s, after `t` (n,) seconds from now."""
-        self._add(t, position, velocity, np.full(len(t), index))
-        self._clock, self._place = self._clock + float(t[-1]), position[-1]
+    def _show(self, item: Any, t: Real, position: Real, velocity: Real) -> None:
+        """Be at `position` with `velocity` (n, 3), m and m/s, after `t` (n,) seconds from now.
 
-    def _add(self, t: Real, position: Real, velocity: Real, item: Real) -> None:
-        """Keep samples, but for an instant that the last part ended with."""
+        The first instant is the one that the last part ended with.
+        """
         new = slice(1 if self._parts else 0, None)
         if len(t[new]):
-            self._parts.append((t[new] + self._clock, position[new], velocity[new], item[new]))
+            items = np.broadcast_to(item, t.shape)
+            self._parts.append((self._clock + t[new], position[new], velocity[new], items[new]))
+        self._clock, self._place = self._clock + float(t[-1]), position[-1]
 
     def _change_speed(self, item: MissionItem) -> None:
         change = self._type.dialect.speed_change(item)
@@ -317,29 +307,22 @@ class _Walk:
 
         So does what is not set, of a take-off or a landing.
         """
-        up, landing = self._height(index, item), item.command in LANDINGS
+        number, up = index + 1, height_above_home(item, self._mission)
+        if not math.isfinite(up):
+            raise InputError(
+                f"mission item {number}: altitude {item.z:g}; expected metres, above the sea only "
+                "with the altitude of home"
+            )
+        landing = item.command in LANDINGS
         unset = math.isnan(item.x + item.y) and (landing or item.command in TAKEOFFS)
         zero = (landing or self._type.dialect.zero_means_here) and not (item.x or item.y)
         if unset or zero:
             return np.append(self._last[:2], up)
         if not (abs(item.x) <= 90 and abs(item.y) <= 180):
             raise InputError(
-                f"mission item {index + 1}: {item.x}, {item.y} is no place to fly to; "
-                "expected degrees"
+                f"mission item {number}: {item.x}, {item.y} is no place to fly to; expected degrees"
             )
         return np.append(self._frame.to_local(item.x, item.y), up)
-
-    def _height(self, index: int, item: MissionItem) -> float:
-        """Return the height of `item` above home, m."""
-        if not math.isfinite(item.z):
-            raise InputError(f"mission item {index + 1}: altitude {item.z}; expected metres")
-        height = height_above_home(item, self._mission)
-        if math.isnan(height):
-            raise InputError(
-                f"mission item {index + 1}: an altitude above sea level needs that of the "
-                "mission's home, which the file does not have"
-            )
-        return height
 
     def _check_clock(self, lasting: float) -> None:
         if not self._clock + lasting <= self._longest:

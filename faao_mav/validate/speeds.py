@@ -196,13 +196,9 @@ def _turns(context: ValidationContext) -> Hits:
             told = {"turn": math.degrees(turn), "bank": math.degrees(bank), "needed": needed}
             yield hit("turn-too-tight", before.index, leg=before, room=room, **told)
     if sharp and context.vehicle.type.hovers:
-        (turn, _, leg), slow, passing = max(sharp), "", None
-        if context.vehicle.type.flight_model is not None:
-            passing = context.vehicle.flight_model().corner_speed(turn)
-        if passing is not None:
-            slow = f", passed at about {passing:.1f} m/s"
+        turn, _, leg = max(sharp)
         count, turn = counted(len(sharp), "corner"), math.degrees(turn)
-        yield hit("sharp-corners", leg.index, count=count, turn=turn, leg=leg, slow=slow)
+        yield hit("sharp-corners", leg.index, count=count, turn=turn, leg=leg)
 
 
 @checks

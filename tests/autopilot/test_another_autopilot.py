@@ -2,16 +2,14 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import MISSIONS, edited, free_port
 from served import running
 from typer.testing import CliRunner
 
-from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot import (
     AutopilotFamily,
     Vehicle,
@@ -56,28 +54,10 @@ TABLE = table(
 )
 
 
-@dataclass(frozen=True)
-class Toy(Px4):
-    """It flies like something that is known, on legs of v² = a d: half to speed up."""
-
-    jerk: float = 20.0
-    error_limit: float = 10.0
-    least = 3.0
-    slowest = 0.1
-
-    def shortest_leg(self, speed: Real) -> Real:
-        return speed**2 / self.acceleration
-
-    def radii(self, room: Real, turn: Real, stops: Flags) -> Real:  # noqa: ARG002
-        return np.minimum(4.0, 0.4 * room) + 0 * turn
-
-
-def model(vehicle: ParameterValues, latitude: float | None) -> Toy:
-    """At its own speed and acceleration."""
-    assert latitude is None or abs(latitude) <= 90
-    return Toy(
-        cruise_speed=vehicle.value("cruise_speed"), acceleration=vehicle.value("acceleration")
-    )
+def model(vehicle: ParameterValues, _: float | None) -> Px4:
+    """It flies like something that is known, at its own speed and acceleration."""
+    speed, acceleration = vehicle.value("cruise_speed"), vehicle.value("acceleration")
+    return Px4(cruise_speed=speed, acceleration=acceleration, jerk=20.0, error_limit=10.0)
 
 
 COPTER = VehicleType(

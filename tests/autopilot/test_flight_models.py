@@ -141,23 +141,6 @@ def test_the_lean_angle_and_the_body_bound_its_speed() -> None:
             ArduCopter().fly(path_of([0, 9], speed))
 
 
-def test_it_counts_metres_as_if_the_earth_were_a_sphere() -> None:
-    """A degree of latitude has 110,574 m at the equator and 111,412 m at 60 degrees."""
-    equator, north = (ArduCopter.from_vehicle(Vehicle(), latitude) for latitude in (0.0, 60.0))
-    assert equator.scale[1] == pytest.approx(111_318.845 / 110_574.3, rel=1e-5)
-    assert north.scale[1] == pytest.approx(111_318.845 / 111_412.2, rel=1e-5)
-    flown = equator.fly(path_of([0, 2000j], 8))
-    np.testing.assert_allclose(flown.position[-1], [0, 2000, 30], atol=1.0)
-
-
-def test_the_jerk_rises_no_faster_than_the_aircraft_leans() -> None:
-    """Half of what leaning at 1100 degrees/s² gives is slower than ATC_INPUT_TC from 18 m/s³ on."""
-    assert ArduCopter(jerk=17).rise == pytest.approx(0.3)
-    half = 9.80665 * math.radians(1100) / 2
-    assert ArduCopter(jerk=20).rise == pytest.approx(math.pi * 20 / (2 * half))
-    assert ArduCopter(jerk=20, roll_acceleration=0, pitch_acceleration=0).rise == 0.3
-
-
 def test_legs_take_as_long_as_the_target_takes() -> None:
     rng, worst = np.random.default_rng(1), []
     for _ in range(100):
@@ -210,15 +193,6 @@ def test_radii_are_a_metre_at_least_and_none_narrows_in_a_corner() -> None:
 
 
 # ---- ArduPlane
-
-
-def test_the_demanded_airspeed_falls_as_total_energy_control_lets_it() -> None:
-    """The autopilot's log shows 0.80 m/s², and 1.65 m/s² with TECS_SINK_MIN 3 and cruise 16."""
-    rates = ArduPlane(cruise_speed=22.0).speed_rates
-    assert rates.fall == pytest.approx(0.80, abs=0.01)
-    assert rates.power / 17.7 == pytest.approx(1.38, abs=0.01)
-    rates = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates
-    assert rates.fall == pytest.approx(1.65, abs=0.01)
 
 
 @settings(max_examples=8)

@@ -3,9 +3,6 @@
 import flights
 import numpy as np
 import pytest
-from flight_paths import line, path_of
-
-from faao_mav.autopilot.px4 import Px4
 
 Limits = tuple[float, float]
 """The greatest error of arrivals, s, and of positions, m, both rms."""
@@ -65,30 +62,3 @@ def test_flights_are_foreseen(
     if made:
         assert np.sqrt(np.mean([row.arrival_rms**2 for row in made])) <= 0.3
         assert np.sqrt(np.mean([row.position_rms**2 for row in made])) <= 1.6
-
-
-# What PX4 flew in other missions, none of them used for fitting: mean speeds on straight lines
-# and circles at 8 m/s, slowest speeds at corners.
-
-
-def test_mean_speeds_by_spacing() -> None:
-    for spacing, measured in ((2, 1.5), (3, 1.9), (5, 2.9), (10, 4.8), (20, 7.5), (80, 7.7)):
-        legs = 8 + round(200 / spacing)
-        arrivals = Px4().fly(line(spacing, legs)).arrivals
-        speed = spacing / np.diff(arrivals[legs // 4 : 3 * legs // 4 + 1]).mean()
-        assert speed == pytest.approx(measured, rel=0.04)
-    for spacing, measured in ((5, 2.8), (10, 4.5), (20, 4.9)):
-        legs = round(2 * np.pi * 60 / spacing)
-        path = path_of(list(60 * np.exp(2j * np.pi * np.arange(legs + 1) / legs)))
-        arrivals = Px4().fly(path).arrivals
-        speed = spacing / np.diff(arrivals[legs // 4 : 3 * legs // 4 + 1]).mean()
-        assert speed == pytest.approx(measured, rel=0.08)
-
-
-def test_slowest_speed_at_a_corner() -> None:
-    """Rough: the model is slower at the slowest point, by 0.1 to 0.6 m/s."""
-    for degrees, measured in ((30, 3.6), (60, 2.1), (90, 1.8), (135, 0.9), (180, 0.15)):
-        flown = Px4().fly(path_of([0, 100, 100 + 100 * np.exp(1j * np.radians(degrees))]))
-        about = abs(flown.t - flown.arrivals[1]) < 5
-        slowest = np.linalg.norm(flown.velocity[about], axis=1).min()
-        assert slowest == pytest.approx(measured, abs=0.7)

@@ -74,15 +74,6 @@ def test_a_late_flight_is_told_and_what_serves_it_better(solution: Solution) -> 
         assert better[taken_by(solution.plan)] > 0
 
 
-def test_flights_that_go_on_beyond_w_F_or_never_come_near(solution: Solution) -> None:
-    (t, w), duration = held(solution), solution.plan.flight.duration
-    beyond = w + np.outer(np.maximum(t - solution.t[-1], 0.0), [8.0, 0.0])
-    assert price_flight(solution, t, beyond).duration == pytest.approx(duration, abs=0.05)
-    short = price_flight(solution, t, solution.w[0] + 0.5 * (w - solution.w[0]))
-    assert short.max_path_error > 10
-    assert short.duration > duration - 1
-
-
 def test_the_table_holds_every_slot(small_plan: MakePlan) -> None:
     solution = optimize(small_plan())
     rows = list(csv.DictReader(io.StringIO(precoder_table(solution))))

@@ -1,22 +1,15 @@
 """From a trajectory to the mission whose predicted flight keeps it, in space and time."""
 
 import math
-from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
-from relay_flights import (
-    Trajectory,
-    converted,
-    dash,
-    dash_hover_dash,
-    items_of,
-    plan_with,
-)
+from relay_flights import Trajectory, converted, dash, dash_hover_dash, items_of, plan_with
 
-from faao_mav.arrays import Real
 from faao_mav.autopilot.predict import predict
 from faao_mav.mission import Command
+from faao_mav.plan import Plan
 from faao_mav.schedule import Conversion
 
 STEP = 0.2
@@ -46,82 +39,70 @@ def circle_at_speed() -> Trajectory:
     return t, 60 * np.stack([np.cos(t / 10), np.sin(t / 10)], axis=1)
 
 
-def line_at_speed() -> Trajectory:
-    t = np.arange(0.0, 20.0, STEP)
-    return t, np.outer(6 * t, [1.0, 0.0])
+FLIGHTS = {
+    "dashes": dash_hover_dash,
+    "px4 dashes": lambda: dash_hover_dash(hover=10.0),
+    "eight": eight,
+    "keep back and forth": back_and_forth,
+    "keep long ends": with_long_ends,
+    "circle": circle_at_speed,
+}
 
 
-def at(conversion: Conversion, t: float) -> list[Real]:
-    """The predicted position and velocity at the plan's time `t`."""
-    track = conversion.schedule.track()
-    return [
-        np.array([np.interp(t, track["predicted_t"], x) for x in track[name].T])
-        for name in ("predicted_w", "predicted_v")
-    ]
+@cache
+def made(name: str) -> tuple[Trajectory, Plan, Conversion]:
+    """Return the flight, the plan and the conversion of a case; `keep` its vehicle's parameters."""
+    keep = name.startswith("keep")
+    plan = plan_with(
+        autopilot="px4" if name.startswith("px4") else "ardupilot",
+        recommend=not keep,
+        parameters={} if keep else {"WPNAV_ACCEL": 120.0, "RTL_ALT": 4000.0},
+    )
+    t, w = FLIGHTS[name]()
+    return (t, w), plan, converted(t, w, plan)
 
 
-@pytest.mark.parametrize("flight", [dash_hover_dash, eight, back_and_forth, with_long_ends])
-@pytest.mark.parametrize("recommend", [True, False])
-def test_arducopter_keeps_the_plan_in_space_and_time(
-    flight: Callable[[], Trajectory], recommend: bool
-) -> None:
-    t, w = flight()
-    own = {"WPNAV_ACCEL": 120.0, "RTL_ALT": 4000.0}
-    plan = plan_with(recommend=recommend, parameters=own if recommend else {})
-    conversion = converted(t, w, plan)
-    found = conversion.schedule.deviation
-    assert found.rms < (1 if recommend else 3)
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_the_plan_is_kept_in_space_and_time(name: str) -> None:
+    _, plan, conversion = made(name)
+    found, told = conversion.schedule.deviation, conversion.parameters
+    assert found.rms < (3 if "keep" in name else 2 if "px4" in name else 1.2)
     assert found.path < plan.mission.path_tolerance
-    assert abs(found.late) < 0.5
+    assert abs(found.late) < (0.6 if "px4" in name else 0.5)
     assert len(conversion.mission.items) < 75
-    told = conversion.parameters
     assert conversion.vehicle.parameters == {**plan.vehicle.parameters, **told}
-    if recommend:  # by the names of both generations, beside the vehicle's own
+    if "keep" in name:
+        assert not told
+    elif "px4" in name:
+        assert told["MPC_XY_CRUISE"] == 8.0
+        assert not any(each.startswith("WP") for each in told)
+    else:  # by the names of both generations, beside the vehicle's own
         assert (told["WPNAV_SPEED"], told["WP_SPD"], "RTL_ALT" in told) == (800, 8, False)
         assert told["WPNAV_ACCEL"] == pytest.approx(100 * told["WP_ACC"])
         assert told["WPNAV_JERK"] == told["WP_JERK"]
         assert told["WP_ACC"] > 1.5  # the plan's own limit is not enough for a ramp with jerk
-    else:
-        assert not told
 
 
-def test_px4_keeps_the_plan_in_space_and_time() -> None:
-    t, w = dash_hover_dash(hover=10.0)
-    plan = plan_with(autopilot="px4", recommend=True)
-    conversion = converted(t, w, plan)
-    found = conversion.schedule.deviation
-    assert found.rms < 2
-    assert found.path < plan.mission.path_tolerance
-    assert abs(found.late) < 0.6
-    assert len(conversion.mission.items) < 60
-    assert conversion.parameters["MPC_XY_CRUISE"] == 8.0
-    assert not any(name.startswith("WP") for name in conversion.parameters)
-
-
-@pytest.mark.parametrize("flight", [circle_at_speed, line_at_speed])
-def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in(
-    flight: Callable[[], Trajectory],
-) -> None:
-    t, w = flight()
-    conversion = converted(t, w, plan_with(recommend=True))
-    route = conversion.schedule.route
+def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in() -> None:
+    (t, w), _, conversion = made("circle")
+    route, flown = conversion.schedule.route, conversion.schedule.track()
     assert (route.first, route.last) == (1, len(route.positions) - 2)
     assert route.positions[[route.first, route.last]] == pytest.approx(w[[0, -1]], abs=1e-3)
     for n, planned in ((0, (w[1] - w[0]) / STEP), (-1, (w[-1] - w[-2]) / STEP)):
-        place, velocity = at(conversion, t[n])
+        place, velocity = (
+            [np.interp(t[n], flown["predicted_t"], x) for x in flown[which].T]
+            for which in ("predicted_w", "predicted_v")
+        )
         assert np.hypot(*velocity) == pytest.approx(np.hypot(*planned), abs=0.5)
         assert place == pytest.approx(w[n], abs=1.2)
-    assert conversion.schedule.deviation.rms < 1.2
     assert route.distance == pytest.approx(np.hypot(*np.diff(w, axis=0).T).sum(), rel=0.02)
     assert route.waits[route.first] == route.waits[route.last] == 0
 
 
-@pytest.mark.parametrize("flight", [dash_hover_dash, eight, circle_at_speed])
-def test_the_whole_mission_flies_the_schedule(flight: Callable[[], Trajectory]) -> None:
+@pytest.mark.parametrize("name", ["dashes", "eight", "circle"])
+def test_the_whole_mission_flies_the_schedule(name: str) -> None:
     """What is predicted of the items is what the schedule says of its route, as it is sent."""
-    t, w = flight()
-    plan = plan_with(recommend=True)
-    conversion = converted(t, w, plan)
+    (t, _), plan, conversion = made(name)
     route, flown = conversion.schedule.route, conversion.schedule.flown
     positions, speeds, waits = items_of(conversion.mission, plan)
     assert positions == pytest.approx(route.positions, abs=1e-3)
@@ -155,14 +136,9 @@ def test_a_flight_that_stays_is_one_hold_and_two_samples_are_enough() -> None:
         assert math.isfinite(conversion.schedule.deviation.rms)
 
 
-@pytest.mark.parametrize(
-    ("autopilot", "flight"), [("ardupilot", circle_at_speed), ("px4", back_and_forth)]
-)
-def test_noise_of_rounding_makes_no_other_mission(
-    autopilot: str, flight: Callable[[], Trajectory]
-) -> None:
+@pytest.mark.parametrize("name", ["circle", "px4 dashes"])
+def test_noise_of_rounding_makes_no_other_mission(name: str) -> None:
     """Another processor's optimum differs in the last digits, and so do its predicted flights."""
-    t, w = flight()
-    plan = plan_with(autopilot=autopilot)
+    (t, w), plan, conversion = made(name)
     noise = 1e-9 * np.random.default_rng(0).normal(size=w.shape)
-    assert converted(t, w + noise, plan).mission == converted(t, w, plan).mission
+    assert converted(t, w + noise, plan).mission == conversion.mission

@@ -1,7 +1,7 @@
 """A PX4 multicopter as a flight model."""
 
 from dataclasses import dataclass
-from math import cos, hypot
+from math import hypot
 from typing import ClassVar
 
 import numpy as np
@@ -78,10 +78,6 @@ class Px4(Px4Limits):
         for k in reversed(np.flatnonzero((turn > _STRAIGHT) & ~stops)):
             radii[k] = min(radii[k], radii[k + 1])
         return radii
-
-    def corner_speed(self, turn: float) -> float:
-        """Return how fast it passes a waypoint where it turns by `turn`, rad, in m/s."""
-        return self.passing_speed(self.acceptance_radius, cos(turn))
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
         """Return the predicted flight along `path`, sampled every `step` seconds.
