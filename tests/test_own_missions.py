@@ -79,9 +79,16 @@ def test_the_sample_plane() -> None:
     assert conversion.vehicle.kind == "plane"
 
 
-@pytest.mark.parametrize("finish", ["rtl", "land", "hover"])
-@pytest.mark.parametrize("takeoff", [True, False])
-@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+@pytest.mark.parametrize(
+    ("autopilot", "takeoff", "finish"),
+    [
+        ("ardupilot", True, "land"),
+        ("ardupilot", False, "rtl"),
+        ("ardupilot", False, "hover"),
+        ("px4", False, "land"),
+        ("px4", True, "hover"),
+    ],
+)
 def test_all_ways_to_begin_and_end(autopilot: str, takeoff: bool, finish: str) -> None:
     changes = {
         "vehicle.autopilot": autopilot,

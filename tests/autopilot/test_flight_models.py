@@ -80,48 +80,12 @@ def test_a_planes_motion_is_an_aeroplanes(path: FlightPath) -> None:
     assert (flown.arrivals[1:] >= flown.departures[:-1] - 1e-9).all()
 
 
-@settings(max_examples=12)
-@given(
-    st.builds(
-        CopterBody,
-        lag=st.floats(0.05, 0.6),
-        linear_drag=st.floats(0, 2),
-        quadratic_drag=st.floats(0, 0.1),
-    ),
-    st.builds(PlaneBody, airspeed_lag=st.floats(0.05, 5), sideslip=st.floats(0, 0.9)),
-    st.floats(math.radians(5), math.radians(80)),
-)
-def test_whatever_the_body_a_flight_ends(copter: CopterBody, plane: PlaneBody, lean: float) -> None:
-    top = copter.top_airspeed(lean)
-    drag = (copter.linear_drag + copter.quadratic_drag * top) * top
-    assert math.isinf(top) or drag == pytest.approx(GRAVITY * math.tan(lean), rel=1e-6)
-    path = replace(path_of([0, 80, 80 + 80j, 200 + 80j], 8.0), longest=3000.0)
-    for autopilot in ("ardupilot", "px4"):
-        flown = Vehicle(autopilot, body=copter).flight_model().fly(path)
-        assert np.abs(flown.position[-1, :2] - [200, 80]).max() < 5
-    path = replace(path_of([0, 600, 600 + 600j], 15.0), longest=3000.0)
-    assert np.isfinite(Vehicle(kind="plane", body=plane).flight_model().fly(path).position).all()
-
-
 @pytest.mark.parametrize("model", [ArduCopter(), Px4(), PLANE])
 def test_one_point_is_only_held(model: Model) -> None:
     flown = model.fly(path_of([3 + 4j], holds={0: 2.5}))
     held = {ArduCopter: 2.5, Px4: 2.5, ArduPlane: 0.0}[type(model)]
     assert flown.departures[0] == pytest.approx(held, abs=0.1)
     np.testing.assert_allclose(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
-
-
-@pytest.mark.parametrize(
-    ("model", "up", "down"),
-    [(ArduCopter(climb_speed=2.0, descent_speed=1.0), 33.3, 62.3), (Px4(), 20.0, 40.0)],
-)
-def test_climbs_at_its_own_speed_on_the_straight_line(model: Model, up: float, down: float) -> None:
-    climb = model.fly(path_of([0, 40], 8, heights=[30, 90]))
-    sink = model.fly(path_of([0, 40], 8, heights=[90, 30]))
-    assert climb.departures[-1] == pytest.approx(up, abs=4)
-    assert sink.departures[-1] == pytest.approx(down, abs=5)
-    middle = climb.position[len(climb.t) // 2]
-    assert (middle[2] - 30) / 60 == pytest.approx(middle[0] / 40, abs=0.05)
 
 
 # ---- ArduCopter
@@ -161,12 +125,6 @@ def test_legs_take_as_long_as_the_target_takes() -> None:
 
 
 # ---- PX4
-
-
-def test_no_speed_means_cruise_speed_and_the_limit_holds() -> None:
-    for model, speed, fastest in ((Px4(cruise_speed=3), 0.0, 3), (Px4(max_speed=6), 9.0, 6)):
-        flown = model.fly(line(200, 1, speed))
-        assert flown.velocity[:, 0].max() == pytest.approx(fastest, abs=0.3)
 
 
 def test_a_wide_radius_before_a_small_one_costs_speed() -> None:

@@ -190,6 +190,7 @@ def test_speed_changes() -> None:
         ("change_speed=1,nan", 10),
         ("px4 change_speed=3,3", 3),
         ("px4 change_speed=1,3 change_speed=1,-1", 5),
+        ("px4 MPC_XY_VEL_MAX=3 change_speed=1,9", 3),
     ):
         track = flown(f"{words} takeoff waypoint:300,0,30")
         assert track.velocity[:, 0].max() == pytest.approx(fastest, abs=0.4)
@@ -208,6 +209,8 @@ def test_climb_and_descent_speeds() -> None:
         steep = "takeoff waypoint:0,20,30 waypoint:0,40,90"
         track = flown(f"px4 MPC_Z_VEL_MAX_UP={most} {steep}")
         assert track.velocity[:, 2].max() == pytest.approx(climb, abs=0.5)
+        middle = track.position[np.argmin(abs(track.position[:, 1] - 30))]
+        assert middle[2] == pytest.approx(60, abs=10)  # about the straight line
 
 
 def test_heights_above_the_sea_and_flights_without_a_home() -> None:

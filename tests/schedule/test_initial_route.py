@@ -71,23 +71,6 @@ def test_any_flight_keeps_to_its_path(
         assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1.0 + 5e-3 * len(route.speeds))
 
 
-@given(
-    st.lists(
-        st.tuples(st.floats(-300, 300), st.floats(-300, 300), st.floats(0, 20)),
-        min_size=2,
-        max_size=12,
-    ),
-    st.floats(0.1, 5),
-)
-def test_any_polygon_keeps_to_its_path(
-    points: list[tuple[float, float, float]], tolerance: float
-) -> None:
-    # Not flyable, and so what a converter is most likely to stumble over.
-    w = np.array([p[:2] for p in points])
-    t = np.cumsum([0.2 + p[2] for p in points])
-    check(t, w, plan_with(path_tolerance=tolerance))
-
-
 def test_hovers_are_holds() -> None:
     t, w = dash_hover_dash(hover=40.0)
     route = check(t, w, plan_with())
