@@ -27,7 +27,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from importlib.resources.abc import Traversable
 from typing import Literal, NamedTuple, TypeAlias
 
 Values: TypeAlias = Mapping[str, float]
@@ -243,17 +242,14 @@ def _told(stage: Mapping[str, str], values: Values) -> Response:
     return Response(f"{when}{text}{' at ' * bool(limits)}{' or '.join(limits)}", acts)
 
 
-_TABLE = files("faao_mav.autopilot").joinpath("failsafes.tsv")
-
-
 @cache
-def failsafes(vehicle: str, table: Traversable = _TABLE) -> tuple[Failsafe, ...]:
-    """Return what the `vehicle` of a `table` does, loss by loss.
+def failsafes(vehicle: str) -> tuple[Failsafe, ...]:
+    """Return what the `vehicle` of the table does, loss by loss.
 
     >>> [each.loss for each in failsafes("arduplane")]
     ['RC lost', 'ground station lost', 'battery low']
     """
-    text = table.read_text(encoding="utf-8")
+    text = files("faao_mav.autopilot").joinpath("failsafes.tsv").read_text(encoding="utf-8")
     found: dict[str, list[dict[str, str]]] = {}
     for row in csv.DictReader(text.splitlines(), delimiter="\t"):
         if row["vehicle"] == vehicle:

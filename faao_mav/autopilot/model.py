@@ -227,9 +227,7 @@ class Copter:
     """A copter that leans with a lag, and at which the air drags, which moves at `wind`, m/s.
 
     `lean`, m/s², is what leaning gives; it begins in a hover, held against the wind. The air drags
-    along the `nose`, a direction, and across, each by k v + q v |v|. (Measured in ArduPilot's
-    simulator: with the lean limit at 10.3 m/s the air comes from ahead, at 10.8 and 11.0 m/s 21 and
-    25 degrees from there.)
+    along the `nose`, a direction, and across, each by k v + q v |v|, as in ArduPilot's simulator.
     """
 
     def __init__(self, body: CopterBody, place: complex, wind: complex = 0j) -> None:

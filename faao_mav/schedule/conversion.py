@@ -190,14 +190,11 @@ def _scheduler(plan: Plan, t: Real, w: Real, vehicle: Vehicle) -> Scheduler:
         min_speed=least,
         max_speed=min(fastest, most),
         tolerance=plan.mission.path_tolerance,
-        altitude=_altitude(plan),
+        altitude=plan.origin.elevation + plan.flight.altitude,
         wind=plan.wind,
     )
 
 
-def _altitude(plan: Plan) -> float:
-    return plan.origin.elevation + plan.flight.altitude
-
-
 def _true_over_commanded(plan: Plan) -> float:
-    return plan.aircraft.flight_model().true_over_commanded(_altitude(plan))
+    altitude = plan.origin.elevation + plan.flight.altitude
+    return plan.aircraft.flight_model().true_over_commanded(altitude)

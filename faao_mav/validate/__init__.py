@@ -14,7 +14,6 @@ from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import EnergyUse, energy_use
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
-from faao_mav.validate.demands import Stretch as Stretch
 from faao_mav.validate.rule import CHECKS, read_rules
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
@@ -18,7 +17,7 @@ from faao_mav.plan.model import in_ground
 from faao_mav.schedule.prediction import Prediction, passing, rates_along
 from faao_mav.schedule.route import begins_at_speed
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.demands import LATE_START, LinkCheck, Stretch
+from faao_mav.validate.demands import LATE_START, LinkCheck
 from faao_mav.validate.flown import Line, departure
 from faao_mav.vector import distances_to_path, lengths
 
@@ -27,7 +26,6 @@ from faao_mav.vector import distances_to_path, lengths
 _LEADS = np.arange(-MOST_LEAD, MOST_LEAD + 0.05, 0.1)
 # Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen.
 _EVERY = 10
-_LEAST = 1e-6  # The least loss of rate, bit/s/Hz, that is told: less is rounding. Chosen.
 # Metres below flight.altitude from which a predicted flight has to be clear of the ground that is
 # higher than that. Chosen: lower down it takes off or lands.
 _LOWER = 2.0
@@ -58,7 +56,6 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         path_error=flown.max_path_error,
         path_tolerance=plan.mission.path_tolerance,
         altitude_error=line.altitude_error(solution),
-        worst=_worst(solution, flown),
         unmeasured=tuple(_unmeasured(solution)),
         off_map=_off_map(plan, line),
         away=float(distances_to_path(line.w[::_EVERY], solution.w).min()),
@@ -101,16 +98,14 @@ def _unmeasured(solution: Solution) -> Iterator[str]:
     for name, station, law in zip(names, radio.stations, radio.gain_laws, strict=True):
         away = lengths(solution.w - station.at(solution.t))
         angle, d = np.degrees(np.arctan2(height, away)), np.hypot(away, height)
-        if law.elevation_deg is not None:
-            low, high = law.elevation_deg
-            if np.mean((angle < low - _ANGLE) | (angle > high + _ANGLE)) > _SHARE:
-                seen = f"the {name} sees the route {angle.min():.0f} to {angle.max():.0f} degrees"
-                yield f"{seen} high; the gain was measured from {low:.0f} to {high:.0f}"
-        if law.distance_m is not None:
-            near, far = law.distance_m
-            if np.mean((d < near / _FACTOR) | (d > far * _FACTOR)) > _SHARE:
-                seen = f"the route is {d.min():.0f} to {d.max():.0f} m from the {name}"
-                yield f"{seen}; the gain was measured from {near:.0f} to {far:.0f} m"
+        low, high = law.elevation_deg or (-np.inf, np.inf)
+        if np.mean((angle < low - _ANGLE) | (angle > high + _ANGLE)) > _SHARE:
+            seen = f"the {name} sees the route {angle.min():.0f} to {angle.max():.0f} degrees high"
+            yield f"{seen}; the gain was measured from {low:.0f} to {high:.0f}"
+        near, far = law.distance_m or (0.0, np.inf)
+        if np.mean((d < near / _FACTOR) | (d > far * _FACTOR)) > _SHARE:
+            seen = f"the route is {d.min():.0f} to {d.max():.0f} m from the {name}"
+            yield f"{seen}; the gain was measured from {near:.0f} to {far:.0f} m"
 
 
 def predicted_line(solution: Solution, track: Track | None) -> Line:
@@ -138,34 +133,3 @@ def predicted_line(solution: Solution, track: Track | None) -> Line:
     else:
         start = min((start + _LEADS).tolist(), key=apart)
     return line._replace(t=track.t - start)
-
-
-def _worst(solution: Solution, flown: Prediction) -> Stretch | None:
-    """Return the stretch of slots that costs most of the rate that is planned for."""
-    loss = _lost_in_slots(solution, flown)
-    lost = np.concatenate([[0.0], np.cumsum(loss)]) / len(loss)
-    # The sum from slot i to slot j - 1 is lost[j] - lost[i], the greatest over the least before.
-    end = int(np.argmax(lost - np.minimum.accumulate(lost)))
-    before = lost[: end + 1]
-    begin = int(np.flatnonzero(before <= before.min() + _LEAST / 100)[-1])  # digits apart, the last
-    if lost[end] - lost[begin] < _LEAST:
-        return None
-    ends = solution.t[end - 1] + solution.t[1] - solution.t[0]
-    return Stretch(float(solution.t[begin]), float(ends), float(lost[end] - lost[begin]))
-
-
-def _lost_in_slots(solution: Solution, flown: Prediction) -> Real:
-    """Return by how much the hop that limits the planned rate is worse than planned, bits (n,).
-
-    R_avg is limited by one hop. What is delivered is limited by what comes in until the queue is
-    emptied for the last time, and from then on by the second hop.
-    """
-    in_first, in_second = solution.I_U - flown.I_U, solution.I_G - flown.I_G
-    if not solution.plan.radio.causal:
-        return in_first if flown.rates.R_U <= flown.rates.R_G else in_second
-    if solution.shares is not None:
-        in_first, in_second = solution.shares * in_first, (1 - solution.shares) * in_second
-    emptied = int(np.flatnonzero(flown.relayed.forwarded >= flown.relayed.queue)[-1])
-    loss = np.where(np.arange(len(in_first)) < emptied, in_first, in_second)
-    loss[emptied] = 0.0
-    return loss

@@ -52,11 +52,9 @@ def _link(context: ValidationContext) -> Hits:
     if link.elsewhere:  # and nothing is said of the flight
         yield hit("link-elsewhere", away=link.away / 1000)
         return
-    percent, worst, where = 100 * link.share, link.worst, ""
-    if worst is not None:
-        where = f"; {worst.rate_lost:.3g} of it between {worst.start:.0f} and {worst.end:.0f} s"
+    percent = 100 * link.share
     if percent < GOOD_PERCENT:
-        yield hit("link-rate-reduced", percent=percent, where=where)
+        yield hit("link-rate-reduced", percent=percent)
     for rule, holds in (
         ("link-path", link.path_error > link.path_tolerance + PATH_ALLOWANCE),
         ("link-late", link.late > max(LATE, LATE_PERCENT / 100 * link.planned_duration)),

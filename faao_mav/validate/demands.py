@@ -52,18 +52,6 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
-    """A part of the flight, from `start` to `end` s of the plan, that loses `rate_lost`.
-
-    `rate_lost` is what the planned rate of the whole flight, R_del or R_avg, loses there, bit/s/Hz.
-    """
-
-    start: float
-    end: float
-    rate_lost: float
-
-
-@dataclass(frozen=True, slots=True)
 class LinkCheck:
     """A plan and how the mission is predicted to carry it out.
 
@@ -72,13 +60,12 @@ class LinkCheck:
     is the delivered rate that was planned for. Durations in s; `rms_position_error` and
     `max_position_error` m between planned and predicted position at equal times; `path_error` m
     between planned and predicted path, `path_tolerance` m what the plan allows of it;
-    `altitude_error` m between planned and predicted height; `worst` the stretch that loses most,
-    None if none does; `bandwidth_mhz` is None where the plan has none. `radio` is what the plan
-    says of both links, `away` the least distance, m, between the two paths. `unmeasured` says
-    where the planned route leaves what the gain of a hop was measured at, `off_map` where the
-    predicted flight first is in ground or off a map of the gain. The plan begins `begins`
-    s after the mission; `late_share` is the part of the planned rate that one which begins
-    `LATE_START` later delivers, None where no station moves.
+    `altitude_error` m between planned and predicted height; `bandwidth_mhz` is None where the plan
+    has none. `radio` is what the plan says of both links, `away` the least distance, m, between the
+    two paths. `unmeasured` says where the planned route leaves what the gain of a hop was measured
+    at, `off_map` where the predicted flight first is in ground or off a map of the gain. The plan
+    begins `begins` s after the mission; `late_share` is the part of the planned rate that one which
+    begins `LATE_START` later delivers, None where no station moves.
 
     >>> from faao_mav import plan_mission, read_plan
     >>> link = plan_mission(read_plan("missions/copter_relay.yaml")).check.link
@@ -97,7 +84,6 @@ class LinkCheck:
     path_error: float
     path_tolerance: float
     altitude_error: float = 0.0
-    worst: Stretch | None = None
     causal: bool = True
     bandwidth_mhz: float | None = None
     radio: Radio | None = None

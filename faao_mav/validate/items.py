@@ -10,14 +10,14 @@ from faao_mav.mission.command import (
     LANDINGS,
     TAKEOFFS,
     Command,
-    Frame,
 )
-from faao_mav.mission.item import MissionItem
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
 from faao_mav.validate.rule import Hits, checks, hit
 
 _LANDING_SEQUENCES = (Command.DO_LAND_START, 188)
 _ENDINGS = (*LANDINGS, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM)
+
+_OTHER_COMMAND = "remove the item, or use a command that the autopilot has"
 
 _LAND = (-430.0, 8849.0)
 """The lowest and the highest land on Earth, m above sea level: the Dead Sea's shore, Everest."""
@@ -103,7 +103,9 @@ def _refused(context: ValidationContext) -> Hits:
         unset, refused = dialect.refusal(item), dialect.refusal(dialect.sent(item))
         reason, _, instead = (refused or unset or "").partition("; ")
         if refused is not None:
-            yield hit("refused-on-upload", k, reason=reason, instead=instead or _replacement(item))
+            spline = item.command == Command.NAV_SPLINE_WAYPOINT
+            other = "replace it by plain waypoints" if spline else _OTHER_COMMAND
+            yield hit("refused-on-upload", k, reason=reason, instead=instead or other)
         elif unset is not None:
             yield hit("not-set", k, reason=reason, instead=instead)
         if not fits_message(item):
@@ -115,16 +117,6 @@ def _refused(context: ValidationContext) -> Hits:
         room = f", or {dialect.make_room}" if dialect.make_room else ""
         home = " with home" if dialect.home_row else ""
         yield hit(rule, rows=rows, home=home, fit=dialect.items, room=room)
-
-
-def _replacement(item: MissionItem) -> str:
-    if item.command == Command.NAV_SPLINE_WAYPOINT:
-        return "replace it by plain waypoints"
-    if item.command in FLOWN_TO and item.frame == Frame.MISSION:
-        return "set the frame to 3: height above home"
-    if item.command not in FLOWN_TO and item.frame != Frame.MISSION:
-        return "set the frame to 2, or remove the item"
-    return "remove the item, or use a command that the autopilot has"
 
 
 _RADIUS, _YAW = 1, 3

@@ -16,7 +16,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.prediction import positions_at, price_flight
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.comparison import compare_with_plan, predicted_line
+from faao_mav.validate.comparison import predicted_line
 from faao_mav.validate.flown import FlightRecord, Line, debriefing, plan_start, standing
 
 CHANGES = {
@@ -33,9 +33,8 @@ CHANGES = {
 
 
 @cache
-def solved(start: str = "hover", causal: bool = True) -> Solution:
-    changes = CHANGES | {"flight.start_velocity": start, "radio.causal": causal}
-    return optimize(parse_plan(edited(SMALL, changes)))
+def solved(start: str = "hover") -> Solution:
+    return optimize(parse_plan(edited(SMALL, CHANGES | {"flight.start_velocity": start})))
 
 
 def track(solution: Solution, t: Real, w: Real, reached: Real) -> Track:
@@ -67,7 +66,7 @@ def within(flight: Line, begin: float, end: float) -> Line:
     return Line(*(each[kept] for each in flight))
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     begun=st.floats(100.0, 900.0),
     pause=st.floats(0.0, 40.0),
@@ -116,20 +115,6 @@ def test_the_clock_of_a_prediction_is_that_of_its_departure() -> None:
     near = t[np.argmax(w[:, 1] > 108.9)]  # within 32 m, which is 2 m more than it is at [30, 120]
     found = predicted_line(solution, track(solution, t, w, np.array([200.0])))
     assert t[0] - found.t[0] == pytest.approx(near, abs=MOST_LEAD + 0.2)
-
-
-@pytest.mark.parametrize("causal", [True, False])
-def test_the_stretch_that_costs_most_is_told(causal: bool) -> None:
-    """From 10 to 15 s it flies 20 m to the left, and all that is lost is lost then."""
-    solution = solved("free", causal)
-    w, v = solution.w.copy(), solution.v[20:30]
-    w[20:30] += 20.0 * np.stack([-v[:, 1], v[:, 0]], axis=1) / np.hypot(*v.T)[:, None]
-    link, _ = compare_with_plan(solution, track(solution, solution.t, w, solution.t[-1:]))
-    assert link.worst is not None
-    assert link.worst.start <= 10.0
-    assert link.worst.end == pytest.approx(15.0)
-    lost = link.planned_delivered - link.predicted_delivered
-    assert link.worst.rate_lost == pytest.approx(lost, rel=1e-6)
 
 
 def test_what_became_of_it_is_priced_as_a_prediction_is() -> None:

@@ -123,10 +123,9 @@ class Px4Limits(Model):
         """Return the leg that PX4 makes of `leg` for an aircraft at `place`, m.
 
         It heads for the leg's end; from behind its beginning and farther from there than the radius
-        first for the beginning, from farther beside it for its nearest point. So an aircraft that
-        enters a leg far from it, for the waypoint before was accepted from afar and this one has a
-        small radius, first flies to that waypoint. The leg that it makes begins at the aircraft; on
-        a detour it passes towards the end, and nothing is known of what follows. (FlightTaskAuto)
+        first for the beginning, from farther beside it for its nearest point: so a waypoint that
+        was accepted from afar is flown to first if the next radius is small. On such a detour it
+        passes towards the end, and nothing is known of what follows. (FlightTaskAuto)
         """
         way = (place - leg.origin) * leg.along.conjugate()
         if not leg.along:
