@@ -65,12 +65,9 @@ class Parameter:
 
     def expected(self, name: str) -> str:
         """Return in words which numbers under `name` are of use."""
-        factor = self.names[name]
-        bounds = []
-        if math.isfinite(self.least):
-            bounds.append(f"at least {self.least / factor:g}")
-        if math.isfinite(self.greatest):
-            bounds.append(f"at most {self.greatest / factor:g}")
+        factor, limits = self.names[name], {"at least": self.least, "at most": self.greatest}
+        finite = {word: limit for word, limit in limits.items() if math.isfinite(limit)}
+        bounds = [f"{word} {limit / factor:g}" for word, limit in finite.items()]
         sign = " of either sign" if self.either_sign else ""
         return f"a number{' of ' if bounds else ''}{' and '.join(bounds)}{sign}"
 

@@ -70,9 +70,17 @@ def _link(context: ValidationContext) -> Hits:
 
 def _doubtful_values(radio: Radio) -> Iterator[tuple[str, str]]:
     """Yield what is doubtful about a value of `radio`, and what it may be meant to be."""
-    noises = {"relay": radio.relay.noise, "ground_user": radio.ground_user.noise}
-    for station, watts in noises.items():
-        yield from _doubtful_noise(f"radio.{station}.noise_dbm", dbm(watts), radio.bandwidth_mhz)
+    band_mhz = radio.bandwidth_mhz or _LEAST_BANDWIDTH_MHZ
+    thermal = _THERMAL + 60 + 10 * math.log10(band_mhz)
+    for station, watts in (("relay", radio.relay.noise), ("ground_user", radio.ground_user.noise)):
+        noise, key = dbm(watts), f"radio.{station}.noise_dbm"
+        if noise > _MOST_NOISE:
+            told = f"{key}: {noise:.4g} dBm is more noise than any receiver has"
+            yield told, "receivers have -80 to -120 dBm: is a minus missing?"
+        elif noise < thermal - _COOLED:
+            less = f"less than thermal noise in {band_mhz:g} MHz ({thermal:.0f} dBm)"
+            density = "if it is a density (dBm/Hz), add 10 log10 of the bandwidth in Hz"
+            yield f"{key}: {noise:.4g} dBm is {less}", density
     powers = {"base_station": radio.base_station.power, "relay": radio.relay.power}
     for station, watts in powers.items():
         power, key = dbm(watts), f"radio.{station}.power_dbm"
@@ -81,20 +89,3 @@ def _doubtful_values(radio: Radio) -> Iterator[tuple[str, str]]:
                 f"{key}: {power:.4g} dBm is {watts:,.4g} W, more than relays transmit",
                 f"if {power:.4g} mW are meant, give {10 * math.log10(power):.1f} (dBm)",
             )
-
-
-def _doubtful_noise(
-    key: str, noise: float, bandwidth_mhz: float | None
-) -> Iterator[tuple[str, str]]:
-    in_band = 60 + 10 * math.log10(bandwidth_mhz or _LEAST_BANDWIDTH_MHZ)  # dB over 1 Hz
-    thermal = _THERMAL + in_band
-    if noise > _MOST_NOISE:
-        slip = f"did you mean {-noise:.4g}?" if noise > 0 else "receivers have -80 to -120 dBm"
-        yield f"{key}: {noise:.4g} dBm is more noise than any receiver has", slip
-    elif noise < thermal - _COOLED:
-        wide = f"{bandwidth_mhz:g} MHz" if bandwidth_mhz else "even 1 kHz"
-        given = f"give {noise + in_band:.1f}" if bandwidth_mhz else "add 10 log10 of the Hz"
-        yield (
-            f"{key}: {noise:.4g} dBm is less than thermal noise in {wide} ({thermal:.0f} dBm)",
-            f"if it is a density (dBm/Hz), {given} for the band",
-        )

@@ -5,11 +5,11 @@ without flying them.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from flight_paths import line, path_of, wandering
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -30,8 +30,41 @@ PLANE = ArduPlane()
 COPTERS = [ArduCopter(), QUICK, ArduCopter(acceleration=1), Px4(), SUITED]
 
 
+def path_of(
+    places: Sequence[complex],
+    speed: float | Sequence[float] = 8.0,
+    *,
+    holds: dict[int, float] | None = None,
+    heights: Sequence[float] | float = 30.0,
+) -> FlightPath:
+    """Return the path through `places`, east + i north."""
+    where, count = np.array(places, dtype=complex), len(places)
+    points = np.stack([where.real, where.imag, np.broadcast_to(heights, count)], axis=-1)
+    waits = np.array([(holds or {}).get(k, 0.0) for k in range(count)])
+    speeds = np.full(count - 1, speed, dtype=float)
+    return FlightPath(points, speeds, waits, np.zeros(count, dtype=bool), np.zeros(count))
+
+
+def line(spacing: float, legs: int, speed: float) -> FlightPath:
+    return path_of([complex(spacing * k) for k in range(legs + 1)], speed)
+
+
+@st.composite
+def wandering(draw: st.DrawFn, *, shortest: float = 5.0) -> FlightPath:
+    """Paths of a few legs with any turns, climbs, speeds and holds."""
+    legs = draw(st.integers(1, 5))
+
+    def some(least: float, most: float, count: int = legs) -> list[float]:
+        return draw(st.lists(st.floats(least, most), min_size=count, max_size=count))
+
+    steps = np.array(some(shortest, 120)) * np.exp(1j * np.cumsum(some(-3.1, 3.1)))
+    holds = draw(st.dictionaries(st.integers(0, legs), st.floats(0.5, 20), max_size=2))
+    places, heights = [0j, *np.cumsum(steps)], some(20, 60, legs + 1)
+    return path_of(places, some(1, 12), holds=holds, heights=heights)
+
+
 @settings(max_examples=24)
-@given(wandering(climbs=True), st.sampled_from(COPTERS), st.booleans())
+@given(wandering(), st.sampled_from(COPTERS), st.booleans())
 def test_a_copters_motion_is_continuous_and_within_limits(
     path: FlightPath, model: ArduCopter | Px4, curved: bool
 ) -> None:
@@ -66,7 +99,7 @@ def test_a_copters_motion_is_continuous_and_within_limits(
 
 
 @settings(max_examples=20)
-@given(wandering(shortest=0.0, climbs=True))
+@given(wandering(shortest=0.0))
 def test_a_planes_motion_is_an_aeroplanes(path: FlightPath) -> None:
     flown = PLANE.fly(path)
     speed = np.linalg.norm(flown.velocity, axis=1)
@@ -181,9 +214,6 @@ def test_airspeed_is_held_within_its_limits_and_higher_in_thin_air() -> None:
             assert speed == pytest.approx(held * ratio, rel=2e-3)
 
 
-def test_it_climbs_along_the_leg_as_fast_as_it_may() -> None:
-    flown = PLANE.fly(path_of([0, 1000, 1500], 15.0, heights=[50, 100, 100]))
-    middle = int(flown.arrivals[1] / 0.1 / 2)
-    assert flown.position[middle, 2] == pytest.approx(75, abs=3)
+def test_it_climbs_as_fast_as_it_may() -> None:
     climb = PLANE.fly(path_of([0, 100, 1500], 15.0, heights=[50, 200, 200])).velocity[:, 2]
     assert np.median(climb[climb > 1]) == pytest.approx(5, abs=0.5)

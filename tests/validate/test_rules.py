@@ -46,9 +46,9 @@ def test_a_doubtful_radio_is_told_with_the_likely_slip() -> None:
         return Given(FLOWN, COPTER, link=replace(LINK, radio=plan.radio))
 
     noise, power, band = "relay.noise_dbm", "base_station.power_dbm", {"bandwidth_mhz": 20}
-    density = "if it is a density (dBm/Hz), give -101.0 for the band"
+    density = "if it is a density (dBm/Hz), add 10 log10 of the bandwidth in Hz"
     for trips, passes, action in (
-        ({noise: 91, **band}, {noise: -91}, "mean -91?"),
+        ({noise: 91, **band}, {noise: -91}, "is a minus missing?"),
         ({noise: -174, **band}, {noise: -140}, density),
         ({noise: -110, **band}, {noise: -101, **band}, ""),
         ({power: 100}, {power: 40}, ""),
