@@ -48,7 +48,6 @@ def complaints(found: Check) -> list[str]:
         ("copter_relay", "ardupilot", "recommend"),
         ("copter_relay", "px4", "recommend"),
         ("paper_active", "ardupilot", "keep"),
-        ("paper_active", "px4", "recommend"),
     ],
 )
 def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:

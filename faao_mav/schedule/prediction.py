@@ -73,11 +73,15 @@ class Schedule:
         planned = route.arrivals[route.first] if route.first else route.departures[0]
         return self.met + route.lead - float(planned)
 
+    @property
+    def _clocked(self) -> tuple[Real, Real]:
+        """The plan's times (k,), s, and where the flight then is, (k, 2), m."""
+        return self.flown.t - self.start, self.flown.position[:, :2]
+
     @cached_property
     def late(self) -> float:
         """By how much later than planned the flight is over, s."""
-        t, w = self.flown.t - self.start, self.flown.position[:, :2]
-        return lateness(self.t, self.w, t, w, self.tolerance)
+        return lateness(self.t, self.w, *self._clocked, self.tolerance)
 
     def positions(self, t: Real) -> Real:
         """Return where the aircraft is predicted to be at the plan's times `t` (k,), (k, 2)."""
@@ -88,17 +92,13 @@ class Schedule:
 
         `predicted_t` (k,), s; `predicted_w` and `predicted_v` (k, 2), east and north, m and m/s.
         """
-        return {
-            "predicted_t": self.flown.t - self.start,
-            "predicted_w": self.flown.position[:, :2],
-            "predicted_v": self.flown.velocity[:, :2],
-        }
+        t, w = self._clocked
+        return {"predicted_t": t, "predicted_w": w, "predicted_v": self.flown.velocity[:, :2]}
 
     @cached_property
     def deviation(self) -> Deviation:
         """How far the predicted flight is from the plan."""
-        t, w = self.flown.t - self.start, self.flown.position[:, :2]
-        return deviation(self.t, self.w, t, w, self.tolerance)
+        return deviation(self.t, self.w, *self._clocked, self.tolerance)
 
     @property
     def error(self) -> float:

@@ -283,7 +283,7 @@ def any_items(draw: st.DrawFn) -> MissionItem:
     return do(draw(st.sampled_from([*Command, 183, 206])), *params)
 
 
-@settings(max_examples=40)
+@settings(max_examples=30)
 @drawn(
     st.lists(any_items(), max_size=8),
     st.sampled_from([None, HOME]),

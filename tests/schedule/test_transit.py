@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import FLYABLE, edited
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from faao_mav import Vehicle
@@ -117,6 +117,7 @@ zones = st.lists(
 )
 
 
+@settings(max_examples=30)
 @given(zones=zones, margin=st.sampled_from([0.0, 1.0, 5.0, 20.0]))
 def test_ways_keep_the_margin_whatever_the_fence(zones: list[Any], margin: float) -> None:
     try:

@@ -62,7 +62,7 @@ LIMITS = Limits(1.0, 50.0, 20.0, 5.0, 2.0)
 
 
 @given(mission=missions, bare=st.booleans(), flown=st.booleans())
-@settings(max_examples=50)
+@settings(max_examples=30)
 def test_any_mission_can_be_judged(mission: Mission, bare: bool, flown: bool) -> None:
     flight = track(((0, 0, 0), (0, 0, 30), (0, 90, 30)), [0, 1], 5.0)
     known = flight if flown and len(mission.items) >= 2 else None
