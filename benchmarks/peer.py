@@ -121,8 +121,7 @@ def at_distance(link: Link, rate: Any, number: int, w: Real) -> ClassRate | Curv
     """The curve of `rate` over the logarithm of the path gain, or the closed form at w."""
     if not (isinstance(rate, TableRate) and rate.kind == "curve"):
         return at_best(link, w)
-    assert rate.still is not None
-    grid = rate.table.spline.x - rate.still[0]
+    grid = rate.table.spline.x - np.log(link.power / link.noise)
     spline = ca.interpolant(f"rate{number}", "bspline", [grid], rate.value(grid, 0 * grid))
     return Curve(link, spline, np.zeros((1, 1)))
 

@@ -3,8 +3,7 @@
 Step by step, with the paper's numbers:
 
 1. Start: the straight flight and equal-power precoders; R_avg by (9), (10) of the cutoff rates (7),
-   (8).
-2. Repeat:
+   (8). 2. Repeat:
 3. Problem (27), the trajectory for given precoders. Proposition 1: the exponent D of (16),
    rho_0 A / (||w - p||² + H²), is a convex function of y = ||w - p||², so that its tangent in y,
    D^lb, lies below it and exp(-D^lb) above exp(-D); D^lb is concave in w. (The gradients (25),
@@ -13,12 +12,9 @@ Step by step, with the paper's numbers:
    until xi settles.
 4. Problem (35), the precoders for given positions. Proposition 2: C = u^H P^H M P u, M = H^H H, is
    a convex quadratic form of P, so that its tangent plane C^ap lies below it. P_B(n) occurs in the
-   first sum only and P_U(n) in the second only, so that minimising each sum by itself solves (35):
-   its xi is the larger of the two minima, and of the many solutions that (35) has for the better
-   link this one is the best for that link too.
-5. R_avg of the new iterate, by (9), (10).
-6. to 8. Until R_avg changes by less than `optimizer.tolerance`.
-9. Output.
+   first sum only and P_U(n) in the second only, so that minimising each sum by itself solves (35).
+5. R_avg of the new iterate, by (9), (10). 6. to 8. Until it changes by less than
+   `optimizer.tolerance`. 9. Output.
 
 Where the text leaves a choice: the objective of (27) and (35) is the sum of exponentials of (15),
 not the rate, so that the rate of an iterate may fall; the best iterate by R_avg is returned. Where
@@ -39,7 +35,7 @@ from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.scaled import flight_variables, solve
+from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.precoder import SCHEMES
@@ -48,11 +44,9 @@ from faao_mav.radio.rate import exponents
 MAX_CONES = 300_000
 """Exponential cones accepted in a convex problem: slots times classes, both links. Chosen."""
 
-_MAX_STEPS = 20
-"""Convex problems per step of Algorithm 1 at most. Chosen: the paper gives no number."""
-
-_MIN_DECREASE = 1e-4
-"""Decrease of the objective, relative to its gap, below which a step ends. Chosen."""
+_MAX_STEPS, _MIN_DECREASE = 20, 1e-4
+"""Convex problems per step of Algorithm 1 at most, and the decrease of the objective, relative to
+its gap, below which a step ends. Chosen: the paper gives no number."""
 
 _NEGLIGIBLE = 1e-12
 """Gap of the objective, as a part of its largest value, that counts as zero: rounding errors."""
@@ -95,8 +89,7 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
 
     def tell(stage: str) -> None:
         if observe is not None:
-            most, number = options.max_iterations, len(history)
-            observe(Progress(number, most, stage, max(history)))
+            observe(Progress(len(history), options.max_iterations, stage, max(history)))
 
     for _ in range(options.max_iterations):
         try:
@@ -131,20 +124,19 @@ def _precoders_at(problem: Problem, flight: Trajectory, last: Sequence[Complex])
 def _check_plan(problem: Problem) -> None:
     """Raise `PlanError` for plans that Algorithm 1 is not made for."""
     plan, links = problem.plan, problem.links
-    wrong: dict[str, str] = {}
-    if plan.radio.fading == "ergodic":
-        wrong["radio.fading: ergodic"] = "it plans for one known draw"
-    if plan.optimizer.inputs == "gaussian":
-        wrong["optimizer.inputs: gaussian"] = "its sums are those of an alphabet"
-    if plan.optimizer.rate != "cutoff":
-        wrong[f"optimizer.rate: {plan.optimizer.rate}"] = "its sums are those of the cutoff rate"
-    if any(link.gains.above or not link.gains.law.square for link in links):
-        wrong["radio.gain"] = "its Proposition 1 is of a gain by the square of the distance"
-    for setting, reason in wrong.items():
-        raise PlanError(
-            f"{plan.source}: {setting} is not for algorithm1, as {reason}; change it, or use "
-            "optimizer.method: direct"
-        )
+    inputs, rate = plan.optimizer.inputs, plan.optimizer.rate
+    other_gain = any(link.gains.above or not link.gains.law.square for link in links)
+    for wrong, setting, reason in (
+        (plan.radio.fading == "ergodic", "radio.fading: ergodic", "it plans for one known draw"),
+        (inputs == "gaussian", "optimizer.inputs: gaussian", "its sums are those of an alphabet"),
+        (rate != "cutoff", f"optimizer.rate: {rate}", "its sums are those of the cutoff rate"),
+        (other_gain, "radio.gain", "its Proposition 1 is of a gain by the distance squared"),
+    ):
+        if wrong:
+            raise PlanError(
+                f"{plan.source}: {setting} is not for algorithm1, as {reason}; change it, or use "
+                "optimizer.method: direct"
+            )
     cones = problem.kinematics.slots * sum(len(link.classes.multiplicity) for link in links)
     if cones > MAX_CONES:
         raise PlanError(
@@ -205,7 +197,7 @@ def optimize_trajectory(
         for s in sums:
             sum_lb, quadratic = convex_bound(s, last.w, flight.w, gap)
             constraints += [quadratic, sum_lb - (s.offset + floor) / gap <= objective]
-        _minimize(objective, constraints, "(27)")
+        minimize(objective, constraints)
         return flight.trajectory()
 
     return _successively(
@@ -255,7 +247,7 @@ def optimize_precoders(link: Link, H: Complex, P: Complex) -> Complex:
         slope, c = precoder_tangent(H, P_i, link.classes.vectors, link.power, link.noise)
         factor, p = shrink(c), cp.Variable((slots, 2 * N * N))
         total = _exponentials(link, factor * c, -factor[..., None] * slope, p, gap)
-        _minimize(total, [cp.norm(p, axis=1) <= 1], "(35)")
+        minimize(total, [cp.norm(p, axis=1) <= 1])
         parts = np.asarray(p.value).reshape(slots, 2, N, N)
         P = parts[:, 0] + 1j * parts[:, 1]
         norm = np.maximum(np.linalg.norm(P, axis=(1, 2), keepdims=True), 1.0)
@@ -290,11 +282,6 @@ def _exponentials(
     return cp.sum(
         cp.exp(rows @ cp.vec(x, order="C") + np.round(constant + weight, _DECIMALS).ravel())
     )
-
-
-def _minimize(objective: cp.Expression, constraints: list[Any], number: str) -> None:
-    if solve(cp.Problem(cp.Minimize(objective), constraints)) == cp.INFEASIBLE:
-        raise SolverError(f"Clarabel calls {number} infeasible, although a solution is known")
 
 
 def shrink(c: Real) -> Real:

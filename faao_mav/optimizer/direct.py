@@ -11,7 +11,6 @@ Measured (benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from t
 starts, and several times quicker.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -22,13 +21,10 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import Design, Link, design
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
-    constraints_of,
     feasible,
-    maximize,
     nearest_flight,
     objective,
 )
-from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
@@ -108,14 +104,16 @@ def direct(
     solution = make_solution(
         problem, flight, precoders, [], converged=best.converged, ending=ending
     )
-    found = solution.delivered_rate if problem.plan.radio.causal else solution.rates.R_avg
+    found = solution.maximised
     # values by tables may be above those of the precoders, and without shadowing more is delivered
     history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
     return replace(
         solution,
         history=np.append(np.minimum(history, found), found),
         starts={name: min(each, found) for name, each in (reached | ends).items()},
-        gain=None if before is None else found - search.worth(before.w, [before.P_B, before.P_U]),
+        gain=None
+        if before is None
+        else found - problem.value(problem.rates(before.w, [before.P_B, before.P_U])),
     )
 
 
@@ -132,20 +130,13 @@ class _Search:
         """Steps of one search at most."""
         return self.problem.plan.optimizer.max_iterations * _LONG_SEARCH
 
-    def worth(self, w: Real, precoders: Sequence[Complex] | None = None) -> float:
-        """Return what is maximised, bit/s/Hz, at w (n, 2) with `precoders` or the scheme's."""
-        problem = self.problem
-        if precoders is None:
-            precoders = [self.scheme.precoders(link, link.channel(w)) for link in problem.links]
-        rates = problem.rates(w, precoders)
-        return objective(rates, problem.kinematics, problem.maximised_queue)
-
     def value(self, flight: Trajectory) -> float:
         """Return what is reported: by the alphabet or the steps, not what smooths them."""
-        if self.scheme.gaussian or self.problem.uav_user.steps is not None:
-            return self.worth(flight.w)
-        rates = self.field.value(flight.w.T)
-        return objective(rates, self.problem.kinematics, self.problem.maximised_queue)
+        problem = self.problem
+        if not self.scheme.gaussian and problem.uav_user.steps is None:
+            return problem.value(self.field.value(flight.w.T))
+        precoders = [self.scheme.precoders(link, link.channel(flight.w)) for link in problem.links]
+        return problem.value(problem.rates(flight.w, precoders))
 
     def routes(
         self, before: Solution | None, known: Trajectory | None, *, alone: bool
@@ -169,8 +160,7 @@ class _Search:
             near = feasible(kin, next(iter(routes.values())), self._in_time(known), fenced)
             routes = {"known": near} if alone else routes | {"known": near}
         if problem.energy < np.inf:
-            kept = (*constraints_of(kin), *problem.constraints(kin))
-            routes = sparing_starts(kin, routes, kept)
+            routes = sparing_starts(kin, routes, problem.limits(kin))
             if not routes:
                 raise InfeasibleError("no flight was found that takes so little energy")
         return routes
@@ -193,23 +183,8 @@ class _Search:
         """Return what is found from `start`: over maps close by, by the maps as they are."""
         if self.problem.mapped:
             return improved_over_map(self.problem, self.field, start)
-        return self.maximized(self.field, start, self.most_steps, warm=warm)
-
-    def maximized(
-        self, stage: Stage, start: Trajectory, most_steps: int, *, warm: bool = True
-    ) -> LocalOptimum:
-        """Return what is found from `start`, which is nearly optimal where `warm`."""
-        kin, options = self.problem.kinematics, self.problem.plan.optimizer
-        return maximize(
-            kin,
-            stage,
-            start,
-            constraints=self.problem.constraints(kin),
-            tolerance=options.tolerance,
-            max_iterations=most_steps,
-            warm=warm,
-            relay=self.problem.maximised_queue,
-        )
+        tolerance = self.problem.plan.optimizer.tolerance
+        return self.problem.improved(self.field, start, tolerance, self.most_steps, warm=warm)
 
     def best(self, optima: list[LocalOptimum]) -> LocalOptimum:
         """Return the best of `optima`; of equal ones that which delivers most, then the first.
@@ -231,20 +206,22 @@ class _Search:
             sharper = replace(self, field=rate_field(self.problem, self.scheme, width))
             now = [sharper.followed(each.trajectory) for each in now]
             found += now
-        return max(found, key=lambda each: self.worth(each.trajectory.w))
+        return max(found, key=lambda each: self.value(each.trajectory))
 
     def under_shadowing(self, optimum: LocalOptimum) -> LocalOptimum:
         """Return the best under shadowing of `optimum` and of those less about one place."""
         begin, problem, field = optimum.trajectory, self.problem, self.field
-        rates, steps = partial(field.value, begin.w.T), problem.plan.optimizer.max_iterations
-        stages = [tolled(problem, field.smoothed(), begin.w, rates, z) for z in TOLLS]
-        found = [optimum, *(self.maximized(each, begin, steps) for each in stages)]
+        rates, options = partial(field.value, begin.w.T), problem.plan.optimizer
+        found = [optimum]
+        for z in TOLLS:
+            stage = tolled(problem, field.smoothed(), begin.w, rates, z)
+            limits = options.tolerance, options.max_iterations
+            found.append(problem.improved(stage, begin, *limits, warm=True))
 
-        def value(each: LocalOptimum) -> float:
-            w = each.trajectory.w
+        def value(w: Real) -> float:
             return worth(problem, w, partial(field.value, w.T))
 
-        return max(found, key=value)
+        return max(found, key=lambda each: value(each.trajectory.w))
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:

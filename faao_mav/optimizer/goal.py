@@ -42,15 +42,12 @@ Chosen: models of power are less true than that."""
 _BITS_PER_DB = math.log2(10) / 10
 """What a link gains of a dB where it is not saturated, bit/s/Hz: the most that capacity gains."""
 
-_PRECISION = 0.01
-"""The share of the longest duration to which that of most data is looked for. Chosen."""
-
-_NEAR = 0.15
-"""The share by which durations are tried on both sides of that of a near energy. Chosen."""
+_PRECISION, _NEAR = 0.01, 0.15
+"""The share of the longest duration to which that of most data is looked for, and the share by
+which durations are tried on both sides of that of a near energy. Chosen."""
 
 _COMPARED = 50
-"""Durations of straight flights among which the thriftiest is looked for, and a tenth of the
-airspeeds. Chosen."""
+"""Durations of straight flights, and airspeeds, of which the thriftiest is sought. Chosen."""
 
 _ABOVE = 1e-4
 """The share by which an energy is above what a flight takes that is a start. Chosen: ten times what
@@ -86,11 +83,11 @@ def reach_goal(plan: Plan, *, observe: Observer | None = None) -> Solution:
         best = flights.ended(flights.within(JOULES_PER_WH * plan.goal.energy_wh))
         return replace(best, least=Least(plan.flight.duration, None, flights.count))
     most = flights.surplus(flights.whole)
-    less = most - flights.data(flights.whole)
     if most < 0:
         raise InfeasibleError(_out_of_reach(plan, flights.whole))
     # whole numbers from one at which nothing is delivered to that of the plan as it is
     at: Callable[[int], Solution]
+    less = most - flights.data(flights.whole)
     if plan.goal.minimise == "duration":
         limit, at = plan.flight.duration, flights.lasting
         low, high = fewest_slots(plan) - 1, plan.flight.slots
@@ -153,14 +150,14 @@ class _Flights:
         taken = self.whole.problem.energy_of(self.whole.trajectory)
         self.taken = math.inf if taken is None else taken
 
-    def data(self, found: Solution) -> float:
-        """Return what `found` delivers, bit/Hz per slot, or where a rate is asked for that."""
-        return found.delivered_rate * (len(found.w) if self.plan.goal.rate is None else 1)
+    def data(self, found: Solution, less: float = 0.0) -> float:
+        """Return what `found` delivers above a rate, bit/Hz per slot; where one is asked for it."""
+        slots = len(found.w) if self.plan.goal.rate is None else 1
+        return (found.delivered_rate - less) * slots
 
     def surplus(self, found: Solution) -> float:
         """Return by how much that is above what is asked for."""
-        needed = found.plan.needed_rate * (len(found.w) if self.plan.goal.rate is None else 1)
-        return self.data(found) - needed
+        return self.data(found, found.plan.needed_rate)
 
     def changed(
         self, changes: dict[str, float], energy: float = math.inf, *, alone: bool = False
@@ -169,13 +166,13 @@ class _Flights:
 
         With `alone` there is no other start.
         """
-        told = ", ".join(f"{key} {value:g}" for key, value in changes.items()) or "as given"
+        told = [f"{key} {value:g}" for key, value in changes.items()] or ["as given"]
         if energy < math.inf:
-            told += f" within {energy / JOULES_PER_WH:.4g} Wh"
+            told.append(f"at most {energy / JOULES_PER_WH:.4g} Wh")
         self.count += 1
         self.last = direct(
             replace(build_problem(self.plan.changed(changes)), energy=energy),
-            observe=staged(self.observe, told),
+            observe=staged(self.observe, ", ".join(told)),
             known=None if self.last is None else self.last.trajectory,
             alone=alone,
         )
@@ -207,7 +204,11 @@ class _Flights:
         assert self.last is not None
         step, tried = self.plan.flight.time_step, dict[int, Solution]()
         low, high = fewest_slots(self.plan), self.plan.flight.slots
-        high = min(high, int(energy / (_least_power(self.plan) * step)))
+        fastest = self.plan.max_ground_speed + math.hypot(*self.plan.wind)
+        airspeeds = np.linspace(self.plan.vehicle.min_speed, fastest, _COMPARED)
+        assert self.plan.power_model is not None  # goals of an energy have one
+        least = self.plan.power_model.least_power(airspeeds)[1] + self.plan.radio.relay.power
+        high = min(high, int(energy / (least * step)))
         if (near := self.last.problem.energy) < math.inf:
             centre = len(self.last.w) * energy / near
             low = max(low, int((1 - _NEAR) * centre))
@@ -242,14 +243,6 @@ class _Flights:
         if energy == math.inf:
             return found
         return max(self.lasting(len(found.w), energy), found, key=self.data)
-
-
-def _least_power(plan: Plan) -> float:
-    """Return the least power of flight and relay, W."""
-    assert plan.power_model is not None  # goals of an energy have one
-    fastest = plan.max_ground_speed + math.hypot(*plan.wind)
-    airspeeds = np.linspace(plan.vehicle.min_speed, fastest, 10 * _COMPARED)
-    return plan.power_model.least_power(airspeeds)[1] + plan.radio.relay.power
 
 
 def thriftiest_straight(plan: Plan) -> tuple[float, float]:

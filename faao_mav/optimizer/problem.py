@@ -15,6 +15,13 @@ from faao_mav.optimizer.design import Link, OwnPrecoder
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.limits import EnergyLimit, fence_constraints
+from faao_mav.optimizer.interior.maximize import (
+    LocalOptimum,
+    constraints_of,
+    maximize,
+    objective,
+)
+from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.plan import Plan
 from faao_mav.plan.station import Station
@@ -77,10 +84,18 @@ class Problem:
         """What the path keeps its distance from; None where it may be anywhere."""
         return fence_geometry(self.plan)
 
+    def value(self, rates: Real) -> float:
+        """Return what is maximised of the rates (2, n) of both hops: R_del, or R_avg, bit/s/Hz."""
+        return objective(rates, self.kinematics, self.maximised_queue)
+
     def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
         energy = self.energy_limit(kin)
         return (*self.fenced(kin), *([] if energy is None else [energy]))
+
+    def limits(self, kin: Kinematics) -> tuple[Constraint, ...]:
+        """Return all that flights of `kin` have to keep."""
+        return (*constraints_of(kin), *self.constraints(kin))
 
     def fenced(
         self, kin: Kinematics, near: tuple[Real, float] | None = None
@@ -112,6 +127,29 @@ class Problem:
     def _radiated(self, kin: Kinematics) -> float:
         """Return what the relay's radio sends, J."""
         return self.plan.radio.relay.power * kin.slots * kin.time_step
+
+    def improved(
+        self,
+        stage: Stage,
+        start: Trajectory,
+        tolerance: float,
+        steps: int,
+        *,
+        kin: Kinematics | None = None,
+        warm: bool = False,
+    ) -> LocalOptimum:
+        """Return the local optimum near `start`, a flight of `kin`, by `stage`: see `maximize`."""
+        kin = kin or self.kinematics
+        return maximize(
+            kin,
+            stage,
+            start,
+            constraints=self.constraints(kin),
+            tolerance=tolerance,
+            max_iterations=steps,
+            warm=warm,
+            relay=self.maximised_queue,
+        )
 
     @property
     def maximised_queue(self) -> RelayQueue | None:

@@ -11,7 +11,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.constraint import ALLOWED, every_excess
-from faao_mav.optimizer.interior.maximize import constraints_of, feasible, maximize
+from faao_mav.optimizer.interior.maximize import feasible
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
@@ -68,7 +68,7 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     again = None if near is None else kin.follow(near)
     found = dict[str, Trajectory]()
     if problem.mapped:
-        if again is None or every_excess(kin, (*constraints_of(kin), *kept), again) > ALLOWED:
+        if again is None or every_excess(kin, problem.limits(kin), again) > ALLOWED:
             along = next(flights_over_map(problem, field, _CELLS), None)
             found = {} if along is None else {"map": along}
         else:
@@ -80,16 +80,8 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
         best = improved_over_map(problem, field, start, _ITERATIONS, ROUGHLY, most=1).trajectory
     else:
         nearer = start if near is None else feasible(kin, start, near, kept)
-        best = maximize(
-            kin,
-            field,
-            nearer,
-            constraints=kept,
-            tolerance=_TOLERANCE,
-            max_iterations=_SLOW_ITERATIONS if slow else _ITERATIONS,
-            warm=nearer is not start and not slow,
-            relay=problem.maximised_queue,
-        ).trajectory
+        steps, warm = _SLOW_ITERATIONS if slow else _ITERATIONS, nearer is not start and not slow
+        best = problem.improved(field, nearer, _TOLERANCE, steps, warm=warm).trajectory
     I_U, I_G = field.value(best.w.T)
     t = np.asarray(kin.time_step * np.arange(kin.slots))
     relayed = problem.relay.relayed(I_U, I_G, kin.time_step)

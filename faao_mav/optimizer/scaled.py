@@ -26,11 +26,7 @@ _ATTEMPTS: tuple[dict[str, Any], ...] = (
 )
 
 # A gap of 1e-4 is good enough to go on from; a limit broken by more than 1e-7 is not.
-_REDUCED_TOLERANCES = {
-    "reduced_tol_gap_abs": 1e-4,
-    "reduced_tol_gap_rel": 1e-4,
-    "reduced_tol_feas": 1e-7,
-}
+_REDUCED = {"reduced_tol_gap_abs": 1e-4, "reduced_tol_gap_rel": 1e-4, "reduced_tol_feas": 1e-7}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,11 +119,13 @@ def _slow_to_turn(kin: Kinematics, about: Real, v: cp.Variable, a: cp.Variable) 
     return (cp.sum(cp.square(a[:-1]), axis=1) - share * counts)[first:] <= 0
 
 
-def solve(problem: cp.Problem) -> str:
-    """Solve with Clarabel and return the status: usable, or `cp.INFEASIBLE`.
+def minimize(objective: cp.Expression, constraints: list[Any]) -> cp.Problem:
+    """Return the problem of the least `objective`, solved by Clarabel.
 
-    Raises `SolverError` for every other end of all attempts.
+    Raises `SolverError` where all attempts fail, or where it finds the problem infeasible: flights
+    that are solved about satisfy it.
     """
+    problem = cp.Problem(cp.Minimize(objective), constraints)
     for attempt in _ATTEMPTS:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
@@ -137,12 +135,12 @@ def solve(problem: cp.Problem) -> str:
                     ignore_dpp=True,
                     canon_backend=cp.SCIPY_CANON_BACKEND,
                     **attempt,
-                    **_REDUCED_TOLERANCES,
+                    **_REDUCED,
                 )
             except cp.error.SolverError:
                 continue
         if problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
-            return str(problem.status)
+            return problem
         if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
-            return str(cp.INFEASIBLE)
+            break
     raise SolverError("Clarabel made no progress on a convex problem")

@@ -23,9 +23,8 @@ from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.spline import Spline
 
-SHADOWINGS, _COMPARED = 400, 200
-"""Shadowings of which quantiles are told, with an error of 7 % of the standard deviation, and by
-which flights are compared. Chosen."""
+SHADOWINGS = 400
+"""Shadowings of which quantiles are told: their error is 7 % of the standard deviation. Chosen."""
 
 _WAVES = 64
 """Waves of which a field is the sum. Chosen."""
@@ -142,7 +141,7 @@ def shadowed(solution: Solution) -> Shadowed | None:
 def worth(problem: Problem, w: Real, rates: Rates) -> float:
     """Return what the plan wants of the `outcomes`: their mean, or `radio.reliability`'s part."""
     reliability = problem.plan.radio.reliability
-    found = outcomes(problem, w, rates, _COMPARED)[:, -1] / len(w)
+    found = outcomes(problem, w, rates)[:, -1] / len(w)
     return float(found.mean() if reliability is None else np.quantile(found, 1 - reliability))
 
 

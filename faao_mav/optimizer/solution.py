@@ -196,6 +196,11 @@ class Solution:
         """The delivered rate R_del, the mean of what is forwarded, bit/s/Hz; at most R_avg."""
         return self.relayed.rate
 
+    @property
+    def maximised(self) -> float:
+        """What the plan maximises, bit/s/Hz: R_del, or R_avg where it is not causal."""
+        return self.delivered_rate if self.plan.radio.causal else self.rates.R_avg
+
     @cached_property
     def steps(self) -> tuple[Integers, Integers] | None:
         """Which of the radio's own rates the hops have in each slot, (n,): 1 is the lowest, 0 none.

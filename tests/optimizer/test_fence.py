@@ -11,12 +11,10 @@ from hypothesis import given
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.fence_geometry import ConvexObstacles, FenceGeometry
-from faao_mav.optimizer.interior.maximize import nearest_flight
 from faao_mav.optimizer.kinematics import Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.starts import starts
-from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Solution, load_solution, save_solution
 
 places = st.tuples(*[st.floats(-100, 100, allow_subnormal=False)] * 2)
@@ -51,11 +49,7 @@ def test_separation_is_the_distance_of_shapely(
         assert apart == pytest.approx(distance, abs=1e-9)
 
 
-@given(
-    outline=outlines,
-    way=st.lists(places, min_size=4, max_size=8),
-    speed=st.floats(1, 50),
-)
+@given(outline=outlines, way=st.lists(places, min_size=4, max_size=8), speed=st.floats(1, 50))
 def test_clearance_is_that_of_the_continuous_path(
     outline: shapely.Polygon, way: list[tuple[float, float]], speed: float
 ) -> None:
@@ -86,12 +80,9 @@ QUICK = {
     "name",
     [
         "a gap 15 m wide",
-        "a zone over the base station",
         "inclusion with a bay",
         "zones that touch",
         "a fence from a file",
-        pytest.param("a wall between the stations", marks=pytest.mark.slow),
-        pytest.param("two ways round of different worth", marks=pytest.mark.slow),
     ],
 )
 def test_the_whole_path_keeps_the_margin(name: str) -> None:
@@ -107,22 +98,13 @@ def test_forty_polygons_are_passed() -> None:
     assert clearance(optimize(plan)) >= plan.margin - 1e-6
 
 
-def test_a_fence_that_is_far_away_changes_nothing(small_plan: MakePlan) -> None:
-    free = optimize(small_plan())
-    fence = {"exclusion": [{"center": [-200, -200], "radius": 20}]}
-    kept = optimize(small_plan({"fence": fence}))
-    assert kept.rates.R_avg == pytest.approx(free.rates.R_avg, abs=1e-4)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"radio.causal": True, "radio.duplex": "half"},
-        {"radio.fading": "realization"},
-        {"flight.start_velocity": "free", "flight.bound_first_acceleration": False},
-    ],
-)
-def test_every_kind_of_plan_keeps_out(small_plan: MakePlan, changes: dict[str, object]) -> None:
+def test_every_kind_of_plan_keeps_out(small_plan: MakePlan) -> None:
+    changes = {
+        "radio.causal": True,
+        "radio.duplex": "half",
+        "flight.start_velocity": "free",
+        "flight.bound_first_acceleration": False,
+    }
     fence = {"margin": 1, "exclusion": [{"center": [22, 22], "radius": 8}]}
     starts = {"optimizer.starts": ["straight", "user"], "optimizer.max_iterations": 20}
     solution = optimize(small_plan({"fence": fence, **starts, **changes}))
@@ -153,22 +135,6 @@ def test_both_ways_round_are_starts() -> None:
     assert sides == {-1.0, 1.0}
     for flight in flights.values():
         assert max(kin.residuals(flight).values()) < 1e-6
-
-
-def test_a_path_that_ignores_dynamics_becomes_a_flight_on_its_side() -> None:
-    problem = build_problem(fenced("a circle on the straight line", **QUICK))
-    kin = problem.kinematics
-    corner = np.array([260.0, 260.0])
-    half = kin.slots // 2
-    path = np.vstack([
-        np.linspace(kin.start, corner, half), np.linspace(corner, kin.end, kin.slots - half)
-    ])  # fmt: skip
-    flight = nearest_flight(kin, path, straight_flight(kin), problem.constraints(kin))
-    assert flight is not None
-    assert max(kin.residuals(flight).values()) < 1e-6
-    assert problem.fence is not None
-    assert problem.fence.excess(kin, flight) == 0
-    assert (flight.w.sum(axis=1) > 330).all()
 
 
 def test_no_time_for_the_way_round_is_said() -> None:

@@ -3,12 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from certificate import still_gained
 from conftest import MakePlan
 
-from faao_mav.errors import PlanError
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import fresh_rates, price, saturation
 from faao_mav.optimizer.problem import build_problem
@@ -42,7 +40,6 @@ def maximised(solution: Solution) -> float:
     "changes",
     [
         BPSK | {"radio.fading": "none", "radio.causal": True, "radio.duplex": "half"},
-        BPSK | {"radio.fading": "realization", "radio.causal": False},
         {"radio.fading": "none", "optimizer.inputs": "gaussian"},
     ],
 )
@@ -98,23 +95,3 @@ def test_what_surrounds_a_plan_speaks_of_it(planned: Solution, tmp_path: Path) -
     loaded = load_solution(tmp_path / "result.npz")
     assert loaded.gain == planned.gain
     assert loaded.recomputed() == planned.rates
-
-
-def test_more_than_two_modes(small_plan: MakePlan) -> None:
-    three = {f"radio.{end}.antennas": 3 for end in ("base_station", "relay", "ground_user")}
-    few = {
-        "flight.time_step": 2,
-        "optimizer.max_iterations": 1,
-        "radio.modulation": "bpsk",
-        "radio.fading": "realization",
-        "power": -3,
-    }
-    many = optimize(plan_of(small_plan, three | few))
-    assert many.gain is not None
-    assert many.gain > -1e-4
-    assert np.sum(np.abs(many.P_U) ** 2, axis=(1, 2)) == pytest.approx(10**-3.3)
-
-
-def test_algorithm1_is_not_made_for_it(paper_plan: MakePlan) -> None:
-    with pytest.raises(PlanError, match=r"optimizer\.rate: mutual_information is not for algorit"):
-        optimize(paper_plan({"optimizer.rate": "mutual_information"}))

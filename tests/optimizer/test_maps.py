@@ -14,7 +14,6 @@ from random_flights import random_flight
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.errors import PlanError
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.direct import direct
@@ -27,7 +26,6 @@ from faao_mav.optimizer.rough import rough_flight
 from faao_mav.optimizer.search.best_rates import best_rates
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import map_bound, most_gain
-from faao_mav.optimizer.search.over_map import queue_sweep
 from faao_mav.optimizer.search.queue_sweep import QueueSweep
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
@@ -57,7 +55,7 @@ def with_maps(problem: Problem, *grids: Grid) -> Problem:
     return replace(problem, bs_uav=first, uav_user=second)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), off=st.floats(0.5, 40.0))
 def test_no_gain_within_a_disc_is_above_its_most(
     small_plan: MakePlan, seed: int, off: float
@@ -75,7 +73,6 @@ def test_no_gain_within_a_disc_is_above_its_most(
 @pytest.fixture(scope="module")
 def mapped(small_plan: MakePlan) -> dict[str, tuple[Problem, float]]:
     kinds: dict[str, dict[str, Any]] = {
-        "full": {},
         "half": {"radio.duplex": "half"},
         "known draws": {"radio.fading": "realization"},
     }
@@ -87,8 +84,8 @@ def mapped(small_plan: MakePlan) -> dict[str, tuple[Problem, float]]:
     return found
 
 
-@pytest.mark.parametrize("kind", ["full", "half", "known draws"])
-@settings(max_examples=30, deadline=None)
+@pytest.mark.parametrize("kind", ["half", "known draws"])
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**31))
 def test_no_flight_over_maps_is_above_the_bound(
     mapped: dict[str, tuple[Problem, float]], kind: str, seed: int
@@ -99,7 +96,7 @@ def test_no_flight_over_maps_is_above_the_bound(
     assert objective(rates, problem.kinematics, problem.maximised_queue) <= bound
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), blurred=st.booleans())
 def test_slopes_over_a_map_are_those_of_differences(
     small_plan: MakePlan, seed: int, blurred: bool
@@ -185,12 +182,13 @@ def delivered(I_U: Real, I_G: Real, kind: str) -> float:
 
 
 @pytest.mark.usefixtures("coarse_map")
-@pytest.mark.parametrize("changes", [{}, {"radio.duplex": "half"}, {"radio.causal": False}])
+@pytest.mark.parametrize("changes", [{"radio.duplex": "half"}, {"radio.causal": False}])
 def test_a_flight_over_maps_is_told_by_the_maps_as_they_are(
     small_plan: MakePlan, changes: dict[str, Any]
 ) -> None:
     """It is no worse than its starts, than the flight that knows no map, and than 200 others."""
-    plain = build_problem(small_plan(FAINT | {"flight.duration": 20} | changes))
+    short = {"flight.duration": 18, "flight.time_step": 1}
+    plain = build_problem(small_plan(FAINT | short | changes))
     problem = with_maps(plain, rough_grid(4), rough_grid(5))
     field, found = rate_field(problem, design(problem.plan)), direct(problem)
 
@@ -213,6 +211,7 @@ GROUND = {
     "flight.end": [80, 0],
     "flight.altitude": 40,
     "flight.duration": 30,
+    "flight.time_step": 1.5,
     "mission.path_tolerance": 2,
 }
 
@@ -235,7 +234,10 @@ def grounded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[dict[str, An
     return make
 
 
-def test_no_flight_goes_through_ground(grounded: Callable[[dict[str, Any]], Plan]) -> None:
+def test_no_flight_goes_through_ground(
+    grounded: Callable[[dict[str, Any]], Plan], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("faao_mav.optimizer.search.over_map.CELLS", (1_000,))
     plan = grounded({})
     found = optimize(plan)
     between = np.linspace(0, 1, 20)[:, None] * np.diff(found.w, axis=0)[:, None]
@@ -248,12 +250,15 @@ def test_no_flight_goes_through_ground(grounded: Callable[[dict[str, Any]], Plan
     rough = rough_flight(plan)
     assert not in_ground(plan.maps, 40.0, rough.w).any()
 
+    def told(w: Real) -> str:
+        """What is told of a predicted flight through these places."""
+        position = np.column_stack([w, np.full(len(w), 40.0)])
+        item, frame = np.zeros(len(w), dtype=int), plan.origin.frame
+        track = Track(found.t, position, 0 * position, item, np.zeros(1), frame)
+        return compare_with_plan(found, track)[0].off_map
 
-def test_steps_of_long_slots_are_few(grounded: Callable[[dict[str, Any]], Plan]) -> None:
-    problem = build_problem(grounded({"flight.duration": 60, "flight.time_step": 5}))
-    sweep = queue_sweep(problem, rate_field(problem, design(problem.plan)), 5_000)
-    assert sweep.steps.targets.shape[1] < 300
-    assert len(sweep.path()) == len(sweep.cells.instants)
+    assert told(found.w) == ""
+    assert told(straight.w).startswith("in the ground under the map of the gain at [")
 
 
 def test_a_place_in_ground_is_named(grounded: Callable[[dict[str, Any]], Plan]) -> None:
@@ -264,24 +269,7 @@ def test_a_place_in_ground_is_named(grounded: Callable[[dict[str, Any]], Plan]) 
     assert grounded({"flight.start": [40, 40], "flight.altitude": 70}).keep_in is None
 
 
-def test_a_predicted_flight_through_ground_is_told(
-    grounded: Callable[[dict[str, Any]], Plan],
-) -> None:
-    solution = optimize(grounded({}))
-
-    def told(w: Real) -> str:
-        position = np.column_stack([w, np.full(len(w), 40.0)])
-        origin = solution.plan.origin
-        item, frame = np.zeros(len(w), dtype=int), LocalFrame(origin.latitude, origin.longitude)
-        track = Track(solution.t, position, 0 * position, item, np.zeros(1), frame)
-        return compare_with_plan(solution, track)[0].off_map
-
-    assert told(solution.w) == ""
-    straight = straight_flight(solution.problem.kinematics).w
-    assert told(straight).startswith("in the ground under the map of the gain at [")
-
-
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31), share=st.floats(0.001, 0.3), points=st.integers(10, 80))
 def test_areas_of_ground_cover_all_that_is_barred(seed: int, share: float, points: int) -> None:
     rng = np.random.default_rng(seed)

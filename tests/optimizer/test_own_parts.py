@@ -38,7 +38,7 @@ class Shannon(StreamRate):
 
 def plan(**changes: object) -> Plan:
     text = (MISSIONS / "copter_relay.yaml").read_text()
-    return parse_plan(text).changed({"flight.time_step": 1.0, "flight.duration": 100, **changes})
+    return parse_plan(text).changed({"flight.time_step": 1.0, "flight.duration": 80, **changes})
 
 
 LAW = {"exponent": 2.2, "elevation_db": [8.0, -12.0]}

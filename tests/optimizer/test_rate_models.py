@@ -56,11 +56,10 @@ def differs(link: Link, rate: RateModel, w: Real, *, curvature: float = 1e-2) ->
     assert hessian == pytest.approx(hessian_by_differences(value, w), rel=curvature, abs=1e-4)
 
 
-@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
 @pytest.mark.parametrize("hop", [0, 1])
-def test_the_envelope_theorem(small_plan: MakePlan, line_of_sight: str, hop: int) -> None:
+def test_the_envelope_theorem(small_plan: MakePlan, hop: int) -> None:
     """At the best precoders: the exact slope, and a curvature that is never too high."""
-    plan = small_plan({"radio.line_of_sight": line_of_sight, "radio.fading": "realization"})
+    plan = small_plan({"radio.fading": "realization"})
     link = build_problem(plan).links[hop]
     w, rate = places(link), SlotRate(link, design(plan))
     best = value_of(link, rate)
@@ -96,10 +95,10 @@ FADINGS: dict[str, dict[str, Any]] = {
     [
         *(("best", fading) for fading in FADINGS),
         *(("zf", fading) for fading in FADINGS),
-        *(("gaussian", fading) for fading in ("none", "instantaneous")),
+        ("gaussian", "instantaneous"),
         ("mrt, gaussian", "statistical"),
-        *(("another law", fading) for fading in ("statistical", "known")),
-        *(("steps", fading) for fading in ("none", "statistical", "instantaneous")),
+        ("another law", "known"),
+        *(("steps", fading) for fading in ("none", "statistical")),
         ("three antennas", "known"),
     ],
 )
@@ -123,16 +122,13 @@ def test_models_have_the_rate_of_every_place_and_its_slopes(
         differs(link, rate, w, curvature=1e-2 if link.steps is None else 2e-2)
 
 
-@pytest.mark.parametrize(("fading", "precoder"), [("ergodic", "faao"), ("none", "zf")])
-def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precoder: str) -> None:
+def test_tables_of_mutual_information(small_plan: MakePlan) -> None:
     """The curves are smooth, and nowhere above what precoders of the place itself carry."""
     plan = small_plan(
         {
             "optimizer.rate": "mutual_information",
-            "optimizer.precoder": precoder,
-            "radio.fading": fading,
+            "radio.fading": "ergodic",
             "radio.fading_samples": 2,
-            "radio.modulation": "qpsk",
             "radio.line_of_sight": "all_ones",
         }
     )
@@ -141,19 +137,6 @@ def test_tables_of_mutual_information(small_plan: MakePlan, fading: str, precode
     assert isinstance(rate, TableRate)
     at = link_coordinates(link, w.T)
     H = link.channel(w)
-    P = rate.initial_precoders(*at) if wanted.optimal else wanted.precoders(link, H)
+    P = rate.initial_precoders(*at)
     assert rate.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
     differs(link, rate, w)
-
-
-def test_the_best_rate_falls_with_the_distance_and_not_with_the_direction(
-    small_plan: MakePlan,
-) -> None:
-    plan = small_plan({"radio.fading": "ergodic", "radio.fading_samples": 8})
-    link, wanted = build_problem(plan).uav_user, design(plan)
-    angle = np.linspace(0, 2 * np.pi, 9)
-    circle = np.column_stack([np.cos(angle), np.sin(angle)])
-    rings = [exactly(link, wanted, link.gains.station + r * circle) for r in (20, 60, 120)]
-    for ring in rings:
-        assert np.ptp(ring) < 1e-5
-    assert rings[0].min() > rings[1].max() > rings[1].min() > rings[2].max()

@@ -23,8 +23,15 @@ def solution(paper_plan: MakePlan) -> Solution:
     return optimize(paper_plan({"optimizer.max_iterations": 1}))
 
 
-def test_saved_keys_and_shapes(solution: Solution, tmp_path: Path) -> None:
+def test_loaded_is_what_was_saved(solution: Solution, tmp_path: Path) -> None:
     save_solution(solution, tmp_path / "result.npz")
+    loaded = load_solution(tmp_path / "result.npz")
+    assert loaded.rates == solution.rates
+    assert loaded.w.tobytes() == solution.w.tobytes()
+    assert contents(loaded.plan) == contents(solution.plan)
+    assert max(loaded.residuals().values()) < 1e-6
+    save_solution(loaded, tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "result.npz").read_bytes()
     with np.load(tmp_path / "result.npz", allow_pickle=False) as saved:
         shapes = {name: saved[name].shape for name in saved.files}
         assert str(saved["plan"]) == solution.plan.text
@@ -36,23 +43,12 @@ def test_saved_keys_and_shapes(solution: Solution, tmp_path: Path) -> None:
     assert {name: shapes[name] for name in expected} == expected
 
 
-def test_loaded_is_what_was_saved(solution: Solution, tmp_path: Path) -> None:
-    save_solution(solution, tmp_path / "result.npz")
-    loaded = load_solution(tmp_path / "result.npz")
-    assert loaded.rates == solution.rates
-    assert loaded.w.tobytes() == solution.w.tobytes()
-    assert contents(loaded.plan) == contents(solution.plan)
-    assert max(loaded.residuals().values()) < 1e-6
-    save_solution(loaded, tmp_path / "again.npz")
-    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "result.npz").read_bytes()
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 broken", b"\x80\x04N.", b"text"])
-def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
+def test_other_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "result.npz"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=r"result\.npz: not a result of faao-mission --save"):
-        load_solution(path)
+    for content in (b"", b"PK\x03\x04 broken", b"\x80\x04N.", b"text"):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"result\.npz: not a result of faao-mission --save"):
+            load_solution(path)
     with pytest.raises(InputError, match="cannot be read"):
         load_solution(tmp_path / "absent.npz")
     np.savez(path, t=np.arange(3))
@@ -85,9 +81,7 @@ WORDS = "{'descr': '<U3', 'fortran_order': False, 'shape': (), }\n"
         ("starts", np.array("[" * 100_000), "starts: .*; expected rates by start"),
         ("H_rB", np.ones((4, 20, 2, 2)), r"H_rB: float64 \(4, 20, 2, 2\)"),
         ("w", np.zeros((20, 2), dtype=complex), "w: complex128"),
-        ("w", np.zeros((3, 2)), r"w: float64 \(3, 2\); expected numbers \(20, 2\)"),
         ("w", np.full((20, 2), np.nan), "w: expected finite numbers"),
-        ("w", np.array(["a"]), "w: <U1"),
         ("P_B", np.ones((20, 1, 2)), r"P_B: float64 \(20, 1, 2\); expected numbers \(20, 2, 2\)"),
     ],
 )
@@ -146,16 +140,6 @@ def test_an_archive_that_unpacks_to_any_size_is_refused(
         tracemalloc.stop()
 
 
-def test_a_directory_without_an_end_is_not_read(solution: Solution, tmp_path: Path) -> None:
-    path = tmp_path / "result.npz"
-    save_solution(solution, path)
-    with zipfile.ZipFile(path, "a") as packed:
-        for number in range(3000):
-            packed.writestr(f"{number}.npy", b"")
-    with pytest.raises(InputError, match="not a result of faao-mission --save"):
-        load_solution(path)
-
-
 def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
     assert replace(solution, P_B=1.1 * solution.P_B).residuals()[
         "(13b) power of the base station"
@@ -174,13 +158,15 @@ def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None
     assert rates.R_G < information.uav_user < 2
     assert information.average == min(information.bs_uav, information.uav_user)
     assert price(solution) == information
+    assert not saturation(solution).saturated
+    assert saturation(solution).spare_db == 0
 
 
 def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan) -> None:
     changes = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
     few, many = (
         price(optimize(small_plan(changes | {"radio.fading": "none", "flight.time_step": step})))
-        for step in (0.05, 0.01)  # 200 slots, and 1000, which are sampled
+        for step in (0.1, 0.02)  # 100 slots, and 500, which are sampled
     )
     assert many.average == pytest.approx(few.average, abs=0.01)
     assert many.delivered == pytest.approx(few.delivered, abs=0.01)
@@ -195,9 +181,3 @@ def test_spare_power_is_what_could_be_saved(paper_plan: MakePlan) -> None:
     assert 5 < limit.spare_db < 40
     at_limit = found.recomputed(10 ** (-limit.spare_db / 10)).R_avg
     assert 0 <= at_limit - SATURATED * 2 < 1e-5
-
-
-def test_a_plan_in_the_active_region_has_no_power_to_spare(solution: Solution) -> None:
-    limit = saturation(solution)
-    assert not limit.saturated
-    assert limit.spare_db == 0

@@ -11,7 +11,7 @@ from faao_mav.optimizer.interior.maximize import Closeness, maximize
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.scaled import flight_variables, solve
+from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.search.straight import even_speed, straight_flight
@@ -37,8 +37,7 @@ FREE = replace(COPTER, start_velocity=None, end_velocity=None)
 
 
 @pytest.mark.parametrize("kin", [COPTER, FREE])
-@pytest.mark.parametrize("speed", [3.0, 7.0, 8.9])
-@pytest.mark.parametrize("degrees", [20.0, 135.0, 250.0])
+@pytest.mark.parametrize(("speed", "degrees"), [(3.0, 135.0), (7.0, 20.0), (8.9, 250.0)])
 def test_starts_keep_the_limits_or_there_is_none(
     kin: Kinematics, speed: float, degrees: float
 ) -> None:
@@ -53,30 +52,20 @@ def test_starts_keep_the_limits_or_there_is_none(
             assert max(kin.residuals(flight).values()) < 1e-7
 
 
-@pytest.mark.parametrize("wind", [(6.0, 0.0), (-5.0, -6.0)])
-def test_the_optimum_of_a_convex_problem_is_clarabels(wind: tuple[float, float]) -> None:
-    kin = replace(FREE, wind=wind, end=np.array([30.0, 20.0]))
+def test_the_optimum_of_a_convex_problem_is_clarabels() -> None:
+    kin = replace(FREE, wind=(-5.0, -6.0), end=np.array([30.0, 20.0]))
     path = np.tile([-60.0, 70.0], (kin.slots, 1))
     best = maximize(kin, Closeness(path), straight_flight(kin), tolerance=1e-6)
     flight = flight_variables(kin)
     apart = cp.sum_squares(flight.w - path / LENGTH) / kin.slots
-    peer = cp.Problem(cp.Minimize(apart), flight.constraints)
-    solve(peer)
+    peer = minimize(apart, flight.constraints)
     assert max(kin.residuals(best.trajectory).values()) < 1e-7
     assert -best.value == pytest.approx(float(peer.value), rel=1e-4, abs=1e-6)
 
 
-@pytest.mark.parametrize("wind", [(4.0, -3.0), (-2.0, 1.0)])
-def test_the_frame_of_the_air_is_calm(wind: tuple[float, float]) -> None:
-    kin = replace(FREE, wind=wind, min_speed=3.0, max_speed=20.0)
-    calm = kin.in_the_air()
-    flight = straight_flight(calm)
-    assert max(calm.residuals(flight).values()) < 1e-9
-    assert max(kin.residuals(kin.over_ground(flight)).values()) < 1e-9
-
-
 CHANGES = {
     "flight.duration": 70,
+    "flight.time_step": 1,
     "vehicle.max_speed": 8,
     "flight.start": [0, 150],
     "flight.end": [150, 0],

@@ -54,16 +54,17 @@ class Disc(Constraint):
         return Rows(value[None], self.side * away[None], bend[None])
 
 
-def _by_slot(gain: float, slope: Real, bend: Real) -> tuple[Real, Real]:
-    """Return gradient (4, n) and Hessian (4, 4, n) by v_n and a_n of a function of both its speeds.
+def _by_slot(gain: float, value: Real, slope: Real, bend: Real) -> Rows:
+    """Return functions of v_n and v_{n+1} = v_n + `gain` a_n as those of v_n and a_n.
 
-    `slope` (2, 2, n) and `bend` (2, 2, 2, n) are those by v_n and by v_{n+1} = v_n + `gain` a_n,
-    of a function without mixed terms.
+    `slope` (m, 2, 2, n) and `bend` (m, 2, 2, 2, n) are those by either; there are no mixed terms.
     """
-    (before, after), (bend_before, bend_after) = slope, bend
-    first = np.concatenate([bend_before + bend_after, gain * bend_after], axis=1)
-    then = np.concatenate([gain * bend_after, gain**2 * bend_after], axis=1)
-    return np.concatenate([before + after, gain * after]), np.concatenate([first, then])
+    m, n, ends = len(value), value.shape[-1], np.array([[1.0, 0.0], [1.0, gain]])
+    return Rows(
+        value,
+        np.einsum("ep,mein->mpin", ends, slope).reshape(m, 4, n),
+        np.einsum("ep,eq,meijn->mpiqjn", ends, ends, bend).reshape(m, 4, 4, n),
+    )
 
 
 @dataclass(frozen=True)
@@ -87,17 +88,10 @@ class SpeedChange(Constraint):
         unit = ends / speed[:, None]
         across = (_SAME - unit[:, :, None] * unit[:, None]) / speed[:, None, None]
         same = np.broadcast_to(_SAME, across.shape)
-        value, slope, bend = [], [], []
-        for scale, size, by_v, by_vv in (
-            (1 / self.fall, speed, unit, across),
-            (-1 / self.rise, speed**2 / 2, ends, same),
-        ):
-            sign = np.array([-scale, scale])[:, None, None]
-            of_slot = _by_slot(self.gain, sign * by_v, sign[..., None] * by_vv)
-            value.append(1 + scale * (size[1] - size[0]))
-            slope.append(of_slot[0])
-            bend.append(of_slot[1])
-        return Rows(np.stack(value), np.stack(slope), np.stack(bend))
+        scale = np.outer([1 / self.fall, -1 / self.rise], [-1, 1])[..., None]
+        value = 1 + (scale * np.stack([speed, speed**2 / 2])).sum(axis=1)
+        slope = scale[..., None] * np.stack([unit, ends])
+        return _by_slot(self.gain, value, slope, scale[..., None, None] * np.stack([across, same]))
 
 
 @dataclass(frozen=True)
@@ -117,11 +111,12 @@ class TurnRate(Constraint):
         v, a = x[:2], x[2:]
         ends, half = np.stack([v, v + self.gain * a]), self.per_speed**2 / 2
         value = (half * ((ends**2).sum(axis=(0, 1)) + 2 * self.wind) - (a * a).sum(axis=0)) / 2
-        same = np.broadcast_to(_SAME, (2, 2, 2, x.shape[1]))
-        slope, bend = _by_slot(self.gain, half * ends, half * same)
-        slope[2:] -= a
-        bend[2:, 2:] -= _SAME
-        return Rows(value[None], slope[None], bend[None])
+        same = np.broadcast_to(_SAME, (1, 2, 2, 2, x.shape[1]))
+        rows = _by_slot(self.gain, value[None], half * ends[None], half * same)
+        rows.slope[0, 2:] -= a
+        assert rows.bend is not None
+        rows.bend[0, 2:, 2:] -= _SAME
+        return rows
 
 
 @dataclass(frozen=True)

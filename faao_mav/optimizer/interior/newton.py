@@ -53,32 +53,24 @@ class Chain:
             self.before[axis, [axis, 2 + axis, 4 + axis]] = 1, grid.advance, grid.bulge
             self.before[2 + axis, [2 + axis, 4 + axis]] = 1, grid.gain
         self.after[4:, COMMON:], self.before[4:, COMMON:] = goal.after, goal.before
+        # A by the unknowns of both slots, (e, 2 k, n - 1): in the matrix the unknowns of a slot
+        # come before the multipliers of its equations
+        now, later = (-self.before, self.moves[:, :-1]), (self.after, self.moves[:, 1:])
+        A = np.concatenate([each[..., None] * moves for each, moves in (now, later)], axis=1)
         self.size = size = k + e
-        # of an equation's multiplier from an unknown of its slot, or of the next, in the matrix
-        links = (-self.before, slice(None, -1), k), (self.after, slice(1, None), -e)
-        self._band = band = max(
-            k - 1,
-            *(abs(d + r - c) for matrix, _, d in links for r, c in np.argwhere(matrix).tolist()),
-        )
-        self._template = np.zeros((n, size, 3 * band + 1))
-        for matrix, slots, distance in links:
-            for row, column in np.argwhere(matrix):
-                value, apart = matrix[row, column] * self.moves[column, slots], row - column
-                self._template[slots, column, 2 * band + distance + apart] = value
-                self._template[:-1, k + row, 2 * band - distance - apart] = value
-        self._template[-1, k:, 2 * band] = 1
-
-        later = self.after[:, :, None] * self.moves[:, 1:]
-        now = self.before[:, :, None] * self.moves[:, :-1]
-        within = np.zeros((k, k, n))
-        within[..., 1:] += np.einsum("ein,ejn->ijn", later, later)
-        within[..., :-1] += np.einsum("ein,ejn->ijn", now, now)
-        across = np.einsum("ein,ejn->ijn", later, now)
+        equation, unknown, slot = np.nonzero(A)
+        row = slot * size + k + equation
+        column = (slot + unknown // k) * size + unknown % k
+        self._band = band = max(k - 1, int(np.abs(row - column).max(initial=0)))
+        self._template = np.zeros((n * size, 3 * band + 1))
+        self._template[column, 2 * band + row - column] = A[equation, unknown, slot]
+        self._template[row, 2 * band + column - row] = A[equation, unknown, slot]
+        self._template[-e:, 2 * band] = 1
+        square = _PENALTY * np.einsum("ein,ejn->ijn", A, A)
         self._square = np.zeros((n, k, 2 * k))  # columns of A^T A, rows from the diagonal down
-        for column in range(k):
-            self._square[:, column, : k - column] = within[column:, column].T
-            self._square[:-1, column, k - column : 2 * k - column] = -across[:, column].T
-        self._square *= _PENALTY
+        for c in range(k):
+            self._square[:-1, c, : 2 * k - c] += square[c:, c].T
+            self._square[1:, c, : k - c] += square[k + c :, k + c].T
 
     def missed(self, x: Real) -> Real:
         """Return A x, (e, n - 1), of unknowns x (k, n)."""
@@ -103,23 +95,20 @@ class Chain:
         _, info = lapack.dpbtrf(cells.reshape(-1, 2 * k).T, lower=1, overwrite_ab=True)
         return bool(info == 0)
 
-    def factored(self, H: Real) -> Callable[[Real], Real] | None:
-        """Return what solves for right-hand sides (m, k + e, n); None if the matrix is singular."""
-        cells, band, k = self._template.copy(), self._band, len(H)
-        masked = self._masked(H)
-        for column in range(k):
-            first = 2 * band - column
-            cells[:, column, first : first + k] += masked[:, column].T
-        flat = cells.reshape(-1, cells.shape[-1]).T
-        lu, pivots, info = lapack.dgbtrf(flat, band, band, overwrite_ab=True)
+    def solved(self, H: Real, right: Real) -> Real:
+        """Return what solves the system for right-hand sides (m, k + e, n).
 
-        def solve(right: Real) -> Real:
-            count = len(right)
-            columns = right.transpose(2, 1, 0).reshape(-1, count)
-            solved, _ = lapack.dgbtrs(lu, band, band, columns, pivots)
-            return np.asarray(solved.reshape(-1, self.size, count).transpose(2, 1, 0))
-
-        return None if info else solve
+        Raises `numpy.linalg.LinAlgError` where it is singular.
+        """
+        cells, band = self._template.copy(), self._band
+        columns, masked = cells.reshape(-1, self.size, cells.shape[1]), self._masked(H)
+        for c in range(len(H)):
+            columns[:, c, 2 * band - c : 2 * band - c + len(H)] += masked[:, c].T
+        sides = right.transpose(2, 1, 0).reshape(-1, len(right))
+        _, _, found, info = lapack.dgbsv(band, band, cells.T, sides, overwrite_ab=True)
+        if info:
+            raise np.linalg.LinAlgError("singular")
+        return np.asarray(found.reshape(-1, self.size, len(right)).transpose(2, 1, 0))
 
     def _masked(self, H: Real) -> Real:
         """Return H with rows and columns of the identity where unknowns are given."""
@@ -301,9 +290,6 @@ def newton_direction(system: System, iterate: Iterate, mu: float, proximal: floa
     held = np.zeros((k, k, 1))
     held[system.held, system.held] = proximal
     H = _convex_part(chain, system.curvature(at, iterate.z), stiff + held) + held
-    solve = chain.factored(H + stiff)
-    if solve is None:
-        raise np.linalg.LinAlgError("singular")
     # columns of the sums, then what is moved without them
     right = np.zeros((sums + 1, k + len(chain.after), n))
     right[:sums, :k] = at.slopes
@@ -311,7 +297,7 @@ def newton_direction(system: System, iterate: Iterate, mu: float, proximal: floa
     pushed[first:] = 0.0
     right[sums, :k] = system.objective + system.pull(at, pushed)
     right[sums, k:, :-1] = -chain.missed(at.x)
-    solved = solve(right)
+    solved = chain.solved(H + stiff, right)
     columns, alone = solved[:sums], solved[sums]
     border = np.zeros((sums + 1, sums + 1))
     border[:sums, :sums] = np.einsum("ikn,jkn->ij", at.slopes, columns[:, :k])

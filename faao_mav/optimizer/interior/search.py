@@ -32,20 +32,17 @@ _MISFIT = 0.25
 _SHORT, _PATIENCE = 0.1, 4
 """Steps below this share of the direction are short, and so many in a row are hugging. Chosen."""
 
-_CENTRING, _MAX_CENTRINGS = 10.0, 8
-"""mu after a centring, in mean gaps before it; the centrings after which a search ends. Measured on
-five hard random plans: with 100 in place of 10 one does not converge, and one loses 8 %."""
-
-_MAX_ATTEMPTS = 6
-"""The directions tried at one iterate before its multipliers are centred. Chosen."""
+_CENTRING, _MAX_CENTRINGS, _MAX_ATTEMPTS = 10.0, 8, 6
+"""mu after a centring, in mean gaps before it; the centrings after which a search ends, and the
+directions tried at one iterate before. Measured on five hard random plans: with 100 in place of 10
+one does not converge, and one loses 8 %."""
 
 _FIRST_PROXIMAL, _MORE_PROXIMAL = 1e-3, 8.0
 """The first proximal term, and by how much the next one is larger. Chosen."""
 
-_FALL, _SOLVED = 0.2, 1.0
-"""mu falls to this share when the scaled gradient is below so many mu. Measured on nine random
-plans with a least speed: with 3 and 10 mu one and four do not converge. Choosing mu by how far a
-step to mu = 0 reaches (Mehrotra) ends as high, in as much time, but not where flights may turn."""
+_FALL = 0.2
+"""mu falls to this share when the scaled gradient is below mu. Measured on nine random plans with a
+least speed: below 3 and 10 mu one and four do not converge."""
 
 _LEAST_GAP = 0.25
 """The complementarity gap per slot at the least mu, in tolerances. Chosen."""
@@ -143,12 +140,6 @@ class Search:
         floored = self.system.floored
         return np.where(floored, z / float(z[floored].sum()), z) if floored.any() else z
 
-    def _value(self, at: Functions) -> float:
-        """Return what is maximised."""
-        if self.goal.total:
-            return float(at.values[self.system.floored].min())
-        return float((self.system.objective * at.x).sum())
-
     def _measure(self) -> tuple[float, float]:
         """Return the scaled gradient of the Lagrangian and the residual; note the best iterate."""
         system, it = self.system, self.iterate
@@ -159,7 +150,10 @@ class Search:
         # what is missed in second order counts tenfold
         broken = 10 * float((system.each * np.abs(it.margin)).max())
         broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
-        value = self._value(at)
+        if self.goal.total:
+            value = float(at.values[system.floored].min())
+        else:
+            value = float((system.objective * at.x).sum())
         kept = broken < self.tolerance
         if (kept and value > self.best) or self.best == -np.inf:
             self.best, self.v = value if kept else -np.inf, at.x[list(V)]
@@ -205,7 +199,7 @@ class Search:
 
     def _lower_mu(self, slope: float) -> None:
         """Lower mu where the scaled gradient `slope` tells that the iterate is near its optimum."""
-        solved = slope * self.steepness < _SOLVED * self.mu or slope < self.tolerance
+        solved = slope * self.steepness < self.mu or slope < self.tolerance
         per_slot = float(self.system.weight.sum()) / self.iterate.at.x.shape[1]
         least = self.tolerance * _LEAST_GAP * self.steepness / per_slot
         self.mu = max(self.mu * (_FALL if solved else 1.0), least)

@@ -10,22 +10,11 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 
 A rate model (``RateModel``) therefore works with l and u, and ``by_position`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
-two models:
-
-====================  ==================================  =========================================
-model                 fading, precoders                   method
-====================  ==================================  =========================================
-``TableRate``         none or averaged over; known per    spline over l + shift and a second
-                      slot, best precoders, two modes     coordinate, tables are kept
-                      at most
-``SlotRate``          known per slot, more modes, or a    the precoders of every slot; central
-                      classical scheme                    differences
-====================  ==================================  =========================================
-
-To change which model a plan gets, or to add one: write a class with ``value`` and ``partials`` and
-return it from ``field.rate_models``, the only place that chooses. What counts as the rate (cutoff
-rate, mutual information) is ``radio.rate``; Gaussian inputs and how precoders follow a channel are
-``optimizer.design``.
+two, and ``field.rate_models`` is the only place that chooses: ``TableRate``, a spline over l +
+shift and a second coordinate, for fading that is none, averaged over, or known per slot with best
+precoders in two modes at most; and else ``SlotRate``, the precoders of every slot, with central
+differences. What counts as the rate (cutoff rate, mutual information) is ``radio.rate``; Gaussian
+inputs and how precoders follow a channel are ``optimizer.design``.
 """
 
 from dataclasses import dataclass

@@ -73,28 +73,24 @@ class Table:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TableRate:
-    """The rate of a link from a table.
-
-    `still` are x - l and y where they do not depend on u, else None.
-    """
+    """The rate of a link from a table."""
 
     link: Link
     kind: Kind
     table: Table
-    still: tuple[Real, Real] | None
 
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (..., n)."""
-        shift, y = self.still or _shifted(self.link, self.kind, cosine)
+        shift, y = _shifted(self.link, self.kind, cosine)
         return np.maximum(0.0, self.table.spline.value(gain_log + shift, y))
 
     def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
         """Return the rate and its derivatives by l and u, bits (..., n)."""
-        if self.still:
-            shift, y = self.still
-            value, by_l, by_ll = self.table.spline.by_x(gain_log + shift, y)
+        here = _shifted(self.link, self.kind, cosine)
+        if self.kind == "curve" or not self.link.follows_position:
+            value, by_l, by_ll = self.table.spline.by_x(gain_log + here[0], here[1])
             return RatePartials(np.maximum(0.0, value), by_l, by_ll)
-        here, up, down = (_shifted(self.link, self.kind, cosine + h) for h in (0.0, STEP, -STEP))
+        up, down = (_shifted(self.link, self.kind, cosine + h) for h in (STEP, -STEP))
         x_u, y_u = ((a - b) / (2 * STEP) for a, b in zip(up, down, strict=True))
         x_uu, y_uu = ((a - 2 * m + b) / STEP**2 for a, m, b in zip(up, here, down, strict=True))
         value, by_x, by_y, by_xx, by_xy, by_yy = self.table.spline.by_both(
@@ -149,24 +145,21 @@ def table_rates(links: Sequence[tuple[Link, Real]], design: Design) -> tuple[Tab
 
     Links of known draws share a table if they have one alphabet and one number of modes.
     """
-    rates, ranges = [], []
+    kinds, ranges = [], []
     for link, span in links:
         kind = kind_of(link, design)
         assert kind is not None
+        kinds.append(kind)
         moving = link.follows_position and kind == "modes"
         directions = np.linspace(-1, 1, _DIRECTIONS) if moving else np.zeros(1)
         slots = 1 if kind != "modes" or link.nlos is None else link.nlos.shape[-3]
-        at = [_shifted(link, kind, np.full(slots, u)) for u in directions]
-        shifts = np.array([shift for shift, _ in at])
+        shifts = np.array([_shifted(link, kind, np.full(slots, u))[0] for u in directions])
         ranges.append((float(span.min() + shifts.min()), float(span.max() + shifts.max())))
-        still = at[0] if kind == "curve" or (kind == "modes" and not moving) else None
-        rates.append((link, kind, still))
-    if rates and all(kind == "modes" for _, kind, _ in rates):
-        lowest, highest = min(low for low, _ in ranges), max(high for _, high in ranges)
-        ranges = [(lowest, highest)] * len(ranges)
+    if kinds and all(kind == "modes" for kind in kinds):
+        ranges = [(min(low for low, _ in ranges), max(high for _, high in ranges))] * len(ranges)
     return tuple(
-        TableRate(link, kind, _table(link, kind, design, low, high), still)
-        for (link, kind, still), (low, high) in zip(rates, ranges, strict=True)
+        TableRate(link, kind, _table(link, kind, design, *ends))
+        for (link, _), kind, ends in zip(links, kinds, ranges, strict=True)
     )
 
 

@@ -22,12 +22,9 @@ from faao_mav.optimizer.search.sweep import largest_within
 _BEYOND = 40.0
 """How far the axis goes beyond stations and ends, m; farther out counts as there. Chosen."""
 
-_INTERVAL, _MOST_INSTANTS = 2.4, 50
-"""Time between instants, s, at least, and instants of a flight at most. Chosen."""
-
-_MOST_CELLS = 100_000
-"""Cells at an instant at most, about: where a_max is small the instants lie farther apart. With ten
-parts and four prices an array of them takes 30 MB. Chosen."""
+_INTERVAL, _MOST_INSTANTS, _MOST_CELLS = 2.4, 50, 100_000
+"""Time between instants, s, at least; instants of a flight, and cells at one, at most: where a_max
+is small the instants lie farther apart. Chosen."""
 
 _PARTS = 4
 """Places to the side of a cell at which rates are tabulated. Chosen."""
@@ -38,7 +35,8 @@ where they are half-way: those near one station are worth less where the other i
 on `paper_active.yaml` at 10 dBm: the outer ones serve T = 50 s, the inner ones T = 150 s."""
 
 _COARSE, _FINE = 6, 12
-"""Cells of the speed that a_max crosses between instants: for the price, and the bound. Chosen."""
+"""Cells of the speed that a_max crosses between instants: for the price, and the bound. Chosen:
+with more the bound is tighter; its time grows with their cube."""
 
 _PASSED, _MERGED, _PARTED = 0.8, 2.5, 10
 """When flights are parted by their place across the axis, over sqrt(distance / a_max); how many
@@ -115,11 +113,8 @@ class AxisBound:
     @cached_property
     def x(self) -> Real:
         """The places of the cells along the axis, m."""
-        along = self.places[0]
-        low = along.min() - _BEYOND
-        return np.asarray(
-            low + self.side * np.arange(int((along.max() + _BEYOND - low) / self.side) + 2)
-        )
+        low, high = self.places[0].min() - _BEYOND, self.places[0].max() + _BEYOND
+        return np.asarray(low + self.side * np.arange(int((high - low) / self.side) + 2))
 
     @cached_property
     def across(self) -> Real:
@@ -226,38 +221,39 @@ class AxisBound:
         return alive
 
     def reached(self, values: Real, sign: int) -> Real:
-        """Return the largest of `values` (B, columns, rows) within one step.
+        """Return the largest of `values` (..., columns, rows) within one step.
 
         That is a step later with `sign` 1, a step earlier with -1.
         """
         # one after the other: the cache of a processor holds one of them, not all
-        return np.concatenate([self._reached(each[None], sign) for each in values])
+        flat = values.reshape(-1, *values.shape[-2:])
+        return np.stack([self._reached(each, sign) for each in flat]).reshape(values.shape)
 
     def _reached(self, values: Real, sign: int) -> Real:
         rows, most = values.shape[-1], int(self.columns[-1])
         room = most + max(reach for _, reach in self.steps)
         ahead = sign * self.columns[:, None]
         source = np.clip(ahead + np.arange(-room, rows + room), 0, rows - 1)
-        sheared = np.take_along_axis(values, source[None], axis=-1)
+        sheared = np.take_along_axis(values, source, axis=-1)
         best = np.full_like(sheared, -np.inf)
         widened = largest_within(sheared, (reach for _, reach in self.steps))
         up = np.maximum.accumulate(values, axis=-1)
         down = np.maximum.accumulate(values[..., ::-1], axis=-1)[..., ::-1]
-        first, last = (np.full(values.shape[:-1], -np.inf) for _ in range(2))
+        first, last = np.full((2, len(values)), -np.inf)
         for change, reach in self.steps:
             here = slice(max(0, -change), len(self.columns) - max(0, change))
             there = slice(max(0, change), len(self.columns) - max(0, -change))
-            np.maximum(best[:, here], widened[reach][:, there], out=best[:, here])
+            np.maximum(best[here], widened[reach][there], out=best[here])
             # from beyond an edge: any place up to what the edge itself reaches
             way = sign * (self.columns[here] + self.columns[there])
             number = np.arange(len(self.columns))[there]
             top = np.clip(way + reach, 0, rows - 1)
             bottom = np.clip(rows - 1 + way - reach, 0, rows - 1)
-            np.maximum(first[:, here], up[:, number, top], out=first[:, here])
-            np.maximum(last[:, here], down[:, number, bottom], out=last[:, here])
+            np.maximum(first[here], up[number, top], out=first[here])
+            np.maximum(last[here], down[number, bottom], out=last[here])
         back = ahead + np.arange(rows) + room
-        found = np.take_along_axis(best, back[None], axis=-1)
-        found[..., 0], found[..., -1] = first, last
+        found = np.take_along_axis(best, back, axis=-1)
+        found[:, 0], found[:, -1] = first, last
         return found
 
     def bound(self, prices: Sequence[float]) -> float:
@@ -280,28 +276,25 @@ class AxisBound:
         Of all parts of the flights the best counts, from some time after they are parted on.
         """
         kin, when, parts = self.problem.kinematics, *self.passed
-        values = np.empty((0, 0, 0, 0))
+        values: Real | None = None
         for k in order:
             t = float(self.times[0][k])
             since = kin.time_step * (kin.slots - 1) - t if end else t
             across = parts[end] if since < _MERGED * when else self.across[None]
             worth = self.rewards(k, prices, across)
-            if values.size:
+            if values is not None:
                 if len(values) > len(across):
                     values = values.max(axis=0, keepdims=True)
-                flat = values.reshape(-1, *values.shape[2:])
-                worth += self.reached(flat, 1 if end else -1).reshape(values.shape)
+                worth += self.reached(values, 1 if end else -1)
             values = worth
+        assert values is not None
         return np.asarray(values.max(axis=0))
 
 
-def axis_bound(
-    problem: Problem, rates: BestRates, *, coarse: int = _COARSE, fine: int = _FINE
-) -> float:
+def axis_bound(problem: Problem, rates: BestRates) -> float:
     """Return an upper bound on R_avg of all flights, bit/s/Hz, full duplex only.
 
-    `rates` are upper bounds on the best rates. With larger `fine` the bound is tighter;
-    time grows with its cube. The price is sought in cells of `coarse`.
+    `rates` are upper bounds on the best rates. The price is sought in coarse cells.
     """
-    price = best_price(AxisBound(problem, rates, coarse).bound)
-    return AxisBound(problem, rates, fine, _PARTED).bound([price + apart for apart in _APART])
+    price = best_price(AxisBound(problem, rates, _COARSE).bound)
+    return AxisBound(problem, rates, _FINE, _PARTED).bound([price + apart for apart in _APART])

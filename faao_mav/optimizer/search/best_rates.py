@@ -88,7 +88,7 @@ def best_at(problem: Problem, link: Link, gain_log: Real) -> tuple[Real, bool]:
     if kind_of(link, optimal):
         span = np.array([gain_log.min(), gain_log.max()])
         (table,) = table_rates([(link, span)], optimal)
-        return table.value(gain_log, gain_log).T, not optimal.averaged and exact
+        return table.value(gain_log, np.zeros(slots)).T, not optimal.averaged and exact
     # One gain after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
 

@@ -21,7 +21,6 @@ from faao_mav.optimizer.interior.maximize import (
     constraints_of,
     maximize,
     nearest_flight,
-    objective,
 )
 from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
@@ -246,7 +245,7 @@ def improved_over_map(
 
 def _worth(problem: Problem, field: RateField, flight: Trajectory) -> float:
     """Return what `problem` maximises, bit/s/Hz, along a `flight` by `field`."""
-    return objective(field.value(flight.w.T), problem.kinematics, problem.maximised_queue)
+    return problem.value(field.value(flight.w.T))
 
 
 def _side(problem: Problem, cells: int) -> float:

@@ -17,11 +17,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, every_excess
 from faao_mav.optimizer.interior.limits import EnergyLimit
-from faao_mav.optimizer.interior.maximize import (
-    feasible,
-    maximize,
-    nearest_flight,
-)
+from faao_mav.optimizer.interior.maximize import feasible, nearest_flight
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Problem
@@ -51,12 +47,9 @@ COARSE_SLOTS = 60
 """Slots of the coarse copy of flights of at least twice as many: enough for the shape of a route.
 Chosen."""
 
-_ROUGH, _COARSE_TOLERANCE = 1e-3, 3e-3
-"""The tolerances on R_avg, bit/s/Hz, to which starts are improved before they are compared: of the
-flights themselves, and on the copy, which differs from them by more. Chosen."""
-
-_COARSE_ERROR = 5e-3
-"""The share of the best value within which starts are equally good on the copy. Chosen."""
+_ROUGH, _COARSE_ERROR = 3e-3, 5e-3
+"""The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared, and the
+share of the best value within which they are equally good on the coarse copy. Chosen."""
 
 _SAME = 0.02
 """The distance of flights that count as one, in the longer of their extents in x and y. Chosen."""
@@ -249,7 +242,7 @@ def improve_starts(
     (the copy cannot make their circles).
     """
     kin = copy = problem.kinematics
-    reward, tolerance = stage, _ROUGH
+    reward = stage
     if kin.slots >= 2 * COARSE_SLOTS and kin.min_speed == 0 and problem.energy == np.inf:
         # Where a(0) has no bound, v(0) does not limit v(1). The first slot of the copy stands for
         # several: on it v(0) is free and a(0) bounded.
@@ -260,19 +253,11 @@ def improve_starts(
             start_velocity=kin.start_velocity if kin.bound_first_acceleration else None,
             bound_first_acceleration=True,
         )
-        reward, tolerance = block_stage(stage, kin.slots, COARSE_SLOTS), _COARSE_TOLERANCE
-    kept, optima = problem.constraints(copy), {}
+        reward = block_stage(stage, kin.slots, COARSE_SLOTS)
+    optima = {}
     for name, flight in flights.items():
         start = flight if copy is kin else copy.follow(paced(copy, flight, kin.time_step))
-        optima[name] = maximize(
-            copy,
-            reward,
-            start,
-            constraints=kept,
-            tolerance=tolerance,
-            max_iterations=max_iterations,
-            relay=problem.maximised_queue,
-        )
+        optima[name] = problem.improved(reward, start, _ROUGH, max_iterations, kin=copy)
     best = max(optimum.value for optimum in optima.values())
     least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
     promising: list[str] = []
