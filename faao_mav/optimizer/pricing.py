@@ -16,7 +16,6 @@ import numpy as np
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
 from faao_mav.optimizer.design import Link, design
-from faao_mav.optimizer.shadowing import arriving
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.channel import rayleigh
 from faao_mav.radio.mutual_information import mutual_information
@@ -193,18 +192,14 @@ def saturation(solution: Solution) -> Saturation:
     False
     """
     problem, n = solution.problem, len(solution.w)
-
-    def maximised(rates: Real, shares: Real | None) -> float:
-        return float(arriving(problem, rates, shares)[-1]) / n
-
     full = np.array([[link.most] for link in problem.links])
-    ceiling = maximised(full.repeat(n, axis=1), None)
+    ceiling = problem.value(full.repeat(n, axis=1))
 
     def enough(db: float) -> bool:
         rates = np.array(solution.recomputed_slots(10 ** (-db / 10)))
-        return maximised(rates, solution.shares) >= SATURATED * ceiling
+        return problem.value(rates, solution.shares) >= SATURATED * ceiling
 
-    if maximised(np.stack([solution.I_U, solution.I_G]), solution.shares) < SATURATED * ceiling:
+    if solution.maximised < SATURATED * ceiling:
         return Saturation(ceiling, 0.0)
     low, high = 0.0, _MAX_SPARE_DB
     while high - low > _SPARE_ERROR:

@@ -84,9 +84,12 @@ class Problem:
         """What the path keeps its distance from; None where it may be anywhere."""
         return fence_geometry(self.plan)
 
-    def value(self, rates: Real) -> float:
-        """Return what is maximised of the rates (2, n) of both hops: R_del, or R_avg, bit/s/Hz."""
-        return objective(rates, self.kinematics, self.maximised_queue)
+    def value(self, rates: Real, shares: Real | None = None) -> float:
+        """Return what is maximised of the rates (2, n) of both hops: R_del, or R_avg, bit/s/Hz.
+
+        In half duplex with these `shares` (n,), or the best ones.
+        """
+        return objective(rates, self.kinematics, self.maximised_queue, shares)
 
     def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""

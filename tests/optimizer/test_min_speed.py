@@ -192,11 +192,15 @@ def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: Make
     assert turned(solution).max() == pytest.approx(1, abs=1e-3)
     assert np.linalg.norm(solution.a, axis=1).max() > 1.1 * TURN * 9
 
-    lively = small_plan(
-        TURNING | {"vehicle.min_speed": 9, "vehicle.parameters": {"NAVL1_PERIOD": 5}}
-    )
+    changes: dict[str, Any] = {"AIRSPEED_CRUISE": 22, "NAVL1_PERIOD": 5}
+    changes = {"vehicle.min_speed": 9, "vehicle.parameters": changes, "flight.duration": 20}
+    faint = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
+    lively = small_plan(TURNING | changes | faint)
     assert not kinematics(lively).turn_binds
     assert kinematics(lively).max_acceleration == lively.vehicle.max_acceleration
+    residuals = optimize(lively).residuals()
+    assert residuals["fall of airspeed"] < 1e-6
+    assert residuals["minimum speed"] < 1e-6
 
 
 def test_algorithm_1_keeps_it_too(paper_plan: MakePlan, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,12 +92,14 @@ def maximize(
     return LocalOptimum(flight, value, search.iterations, search.residual, converged)
 
 
-def objective(values: Real, kin: Kinematics, relay: RelayQueue | None) -> float:
+def objective(
+    values: Real, kin: Kinematics, relay: RelayQueue | None, shares: Real | None = None
+) -> float:
     """Return min_j F_j, or what `relay` delivers, of rewards or both rates `values` (J, n)."""
     if relay is None:
         return float(values.mean(axis=1).min())
     I_U, I_G = values
-    return relay.relayed(I_U, I_G, kin.time_step).rate
+    return relay.relayed(I_U, I_G, kin.time_step, shares).rate
 
 
 def constraints_of(kin: Kinematics) -> tuple[Constraint, ...]:
