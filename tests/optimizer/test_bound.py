@@ -45,7 +45,13 @@ BY_THE_AXIS: dict[str, dict[str, Any]] = {
     "delivered": QUEUE,
     "known draws": QUEUE | {"radio.fading": "realization"},
     "free ends": FREE,
-    "fast": FREE | {"vehicle.max_speed": 40, "vehicle.max_acceleration": 3},
+    "fast": {
+        **FREE,
+        "flight.start": [-60, -60],
+        "flight.end": [120, 110],
+        "vehicle.max_speed": 40,
+        "vehicle.max_acceleration": 3,
+    },
     **{name: {"radio.gain": law} for name, law in LAWS.items()},
 }
 KINDS: dict[str, dict[str, Any]] = BY_THE_AXIS | {

@@ -13,11 +13,12 @@ from test_interior import copter, worst
 from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.maximize import LocalOptimum
+from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.search.starts import improve_starts, starts
+from faao_mav.optimizer.search.starts import COARSE_SLOTS, block_stage, improve_starts, starts
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.plan import read_plan
 
@@ -56,6 +57,23 @@ def test_what_cannot_be_had_is_left_out() -> None:
     assert list(starts(kin(68.0), ["bs", "user"], STATIONS)) == ["straight"]
     across = kin(300, start_velocity=np.array([1.0, 1.0]))
     assert list(starts(across, ["bs"], STATIONS)) == ["straight"]
+
+
+def test_a_block_has_the_mean_of_its_slots() -> None:
+    rng = np.random.default_rng(0)
+    slope = rng.normal(size=(2, 2, 501))
+
+    def stage(w: np.ndarray) -> StageValues:
+        value = np.einsum("cjn,cn->jn", slope, w)
+        return StageValues(value, slope, np.zeros((3, 2, 501)))
+
+    w, shift = rng.normal(size=(2, 2, COARSE_SLOTS))
+    blocks = block_stage(stage, 501, COARSE_SLOTS)
+    found = blocks(w)
+    held = w[:, np.rint(np.arange(501) * (COARSE_SLOTS - 1) / 500).astype(int)]
+    assert found.value.mean(axis=1) == pytest.approx(stage(held).value.mean(axis=1))
+    moved = blocks(w + shift).value - found.value
+    assert moved == pytest.approx(np.einsum("cjn,cn->jn", found.gradient, shift))
 
 
 def test_what_is_rejected_would_not_have_won() -> None:
