@@ -105,7 +105,7 @@ def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(
     def end(*_: object, **__: object) -> LocalOptimum:
         return LocalOptimum(flight, next(values), 1, 0.0, True)
 
-    monkeypatch.setattr("faao_mav.optimizer.problem.maximize", end)
+    monkeypatch.setattr("faao_mav.optimizer.interior.maximize.maximize", end)
     flights, field = {"bs": flight, "user": flight}, rate_field(problem, design(problem.plan))
     assert improve_starts(problem, field, flights, 1)[1] == ["bs"]
 
