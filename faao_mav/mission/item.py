@@ -151,7 +151,7 @@ def jump_target(items: Sequence[MissionItem], index: int) -> int | None:
     """
     item = items[index]
     number = item.params[0]
-    if math.isnan(number):
+    if not math.isfinite(number):
         return None
     if item.command == Command.DO_JUMP:
         return int(number) - 1 if 1 <= int(number) <= len(items) else None

@@ -3,7 +3,8 @@
 Step by step, with the paper's numbers:
 
 1. Start: the straight flight and equal-power precoders; R_avg by (9), (10) of the cutoff rates (7),
-   (8). 2. Repeat:
+   (8).
+2. Repeat:
 3. Problem (27), the trajectory for given precoders. Proposition 1: the exponent D of (16),
    rho_0 A / (||w - p||² + H²), is a convex function of y = ||w - p||², so that its tangent in y,
    D^lb, lies below it and exp(-D^lb) above exp(-D); D^lb is concave in w. (The gradients (25),
@@ -13,8 +14,9 @@ Step by step, with the paper's numbers:
 4. Problem (35), the precoders for given positions. Proposition 2: C = u^H P^H M P u, M = H^H H, is
    a convex quadratic form of P, so that its tangent plane C^ap lies below it. P_B(n) occurs in the
    first sum only and P_U(n) in the second only, so that minimising each sum by itself solves (35).
-5. R_avg of the new iterate, by (9), (10). 6. to 8. Until it changes by less than
-   `optimizer.tolerance`. 9. Output.
+5. R_avg of the new iterate, by (9), (10).
+6. to 8. Until it changes by less than `optimizer.tolerance`.
+9. Output.
 
 Where the text leaves a choice: the objective of (27) and (35) is the sum of exponentials of (15),
 not the rate, so that the rate of an iterate may fall; the best iterate by R_avg is returned. Where

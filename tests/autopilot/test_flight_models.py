@@ -138,6 +138,16 @@ def test_the_lean_angle_and_the_body_bound_its_speed() -> None:
             ArduCopter().fly(path_of([0, 9], speed))
 
 
+def test_a_corner_with_little_acceleration_takes_longer() -> None:
+    """WPNAV_ACCEL_C; of its own it is twice WPNAV_ACCEL, where the radius bounds the corner."""
+    corner = path_of([0j, 100 + 0j, 100 + 100j])
+    own, wide, tight = (
+        ArduCopter(corner_acceleration=limit).fly(corner).departures[-1] for limit in (0, 50, 0.5)
+    )
+    assert own == pytest.approx(wide, abs=0.01)
+    assert own + 0.5 < tight
+
+
 def test_legs_take_as_long_as_the_target_takes() -> None:
     rng, worst = np.random.default_rng(1), []
     for _ in range(100):

@@ -45,8 +45,9 @@ _LEAST_INPUT_TIME = 0.1  # The autopilot's own lower bound of ATC_INPUT_TC, s.
 class ArduCopterLimits(Model):
     """What bounds a flight of ArduCopter, in SI units.
 
-    `latitude` is that of the flight, degrees, None where metres are the autopilot's, which takes
-    the Earth for a sphere. `body` is the aircraft.
+    A `corner_acceleration` of 0 stands for twice `acceleration`. `latitude` is that of the flight,
+    degrees, None where metres are the autopilot's, which takes the Earth for a sphere. `body` is
+    the aircraft.
     """
 
     cruise_speed: float = parameter("m/s", 10.0, "WP_SPD", "WPNAV_SPEED")
@@ -54,6 +55,7 @@ class ArduCopterLimits(Model):
     descent_speed: float = parameter("m/s", 1.5, "WP_SPD_DN", "WPNAV_SPEED_DN")
     acceleration: float = parameter("m/s^2", 2.5, "WP_ACC", "WPNAV_ACCEL")
     climb_acceleration: float = parameter("m/s^2", 1.0, "WP_ACC_Z", "WPNAV_ACCEL_Z")
+    corner_acceleration: float = parameter("m/s^2", 0.0, "WP_ACC_CNR", "WPNAV_ACCEL_C", least=0.0)
     jerk: float = parameter("m/s^3", 1.0, "WP_JERK", "WPNAV_JERK", 1.0)
     radius: float = parameter("m", 2.0, "WP_RADIUS_M", "WPNAV_RADIUS", least=0.05)
     lean_angle: float = parameter("rad", 30, "ATC_ANGLE_MAX", "ANGLE_MAX", least=5, greatest=85)
@@ -95,6 +97,11 @@ class ArduCopterLimits(Model):
         steady = change > most * full
         duration = np.where(steady, change / most + full, 2 * free) * (change > 0)
         return Ramp(duration, np.where(steady, full, free), rise / 2)
+
+    @property
+    def corner(self) -> float:
+        """The greatest acceleration in a corner, m/s²."""
+        return self.corner_acceleration or 2 * self.acceleration
 
     @property
     def lean(self) -> float:

@@ -177,15 +177,18 @@ def _half_overlaps(legs: StraightLegs, ways: Real, top: Real, begun: Real) -> Re
 
     The target moves by the sum of both, along the unit vectors `ways` (m - 1, 3). h is the largest,
     up to half of either's ramp, at which after h s of the overlap it is within the radius of the
-    point between them.
+    point between them, and within the acceleration in a corner.
     """
     ending, beginning = legs.ramp(top)[:-1], legs.ramp(begun)[1:]
-    cosine = np.sum(ways[:-1] * ways[1:], axis=1)
+    cosine, limits = np.sum(ways[:-1] * ways[1:], axis=1), legs.limits
 
-    def apart(h: Real) -> Real:
-        left, gone = top[:-1] * ending.at(h)[0], begun[1:] * beginning.at(h)[0]
-        square: Real = left**2 + gone**2 - 2 * left * gone * cosine
-        return square
+    def excess(h: Real) -> Real:
+        left, _, brake = top[:-1] * ending.at(h)
+        gone, _, push = begun[1:] * beginning.at(h)
+        apart = left**2 + gone**2 - 2 * left * gone * cosine
+        turn = brake**2 + push**2 - 2 * brake * push * cosine
+        worst: Real = np.maximum(apart / limits.radius**2, turn / limits.corner**2)
+        return worst
 
     longest = np.minimum(ending.duration, beginning.duration) / 2
-    return largest(apart, np.full(len(longest), legs.limits.radius**2), longest)
+    return largest(excess, np.ones(len(longest)), longest)
