@@ -22,6 +22,7 @@ _QUICKEST, _FIRST, SLOWEST = 0.02, 0.25, 1.5
 vehicle (ArduPlane) turns 50 times a second; while it is not known how long answers take, and at the
 latest, by the guide."""
 
+_LONGEST = 0.5  # Seconds after which it is put again at the latest on a quick link; chosen.
 _GROWTH = 1.25  # By how much the wait grows with each question that has to be put again; chosen.
 
 
@@ -221,8 +222,8 @@ class Questions(Generic[K]):
 
     def _due(self, question: _Question) -> float:
         """Return when `question` is put again: each time after twice as long."""
-        wait = self.pace.wait * 2.0 ** min(question.times - 1, 8)  # beyond the slowest
-        return question.sent + min(wait, SLOWEST)
+        wait = self.pace.wait * 2.0 ** min(question.times - 1, 8)  # beyond the longest
+        return question.sent + min(wait, max(_LONGEST, self.pace.wait))
 
 
 def ask(
