@@ -186,8 +186,8 @@ def test_text_that_is_no_plan() -> None:
         ("a: !mine {b: 1}\n", "line 1, column 4: tags (!mine) are not used in plans"),
         ("a: {b: 1}\nc: {<<: *a}\n", "line 2, column 9: aliases"),
         ("? {a: 1}\n: 1\n", "line 1, column 3: not valid YAML: found unhashable key"),
-        (f"{SMALL}1: 2\n", "[1]: 1 is not accepted; give a mapping"),
-        (f"{SMALL}~: 2\n", "None: null is not accepted; give a mapping"),
+        (f"{SMALL}1: 2\n", "[1]: a key has to be a word, not 1"),
+        (f"{SMALL}~: 2\n", "None: a key has to be a word, not null"),
         (
             "a:\n\tb: 1\n",
             "line 2, column 1: not valid YAML: found character '\\t' that cannot start "

@@ -157,8 +157,9 @@ def _adapter() -> TypeAdapter[StudyRow]:
 
 def table(rows: Sequence[StudyRow]) -> str:
     """Return the rows as CSV: varied keys, scheme, seed, what came out, and the error if any."""
+    varied = dict.fromkeys(key for row in rows for key in row.values)
     out = io.StringIO()
-    writer = csv.DictWriter(out, [*rows[0].values, *_RESULTS], lineterminator="\n")
+    writer = csv.DictWriter(out, [*varied, *_RESULTS], lineterminator="\n")
     writer.writeheader()
     writer.writerows(as_dict(row) for row in rows)
     return out.getvalue()
@@ -201,6 +202,7 @@ def comparison(rows: Sequence[StudyRow]) -> str:
 
 
 def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
+    varied = dict.fromkeys(key for row in rows for key in row.values)
     schemes = list(dict.fromkeys(row.scheme for row in rows))
     found: dict[tuple[str, ...], dict[str, list[float]]] = {}
     for row in rows:
@@ -208,7 +210,7 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
         values = tuple(json.dumps(value).strip('"') for value in row.values.values())
         rates = found.setdefault(values, {}).setdefault(row.scheme, [])
         rates += [] if (rate := getattr(row, measure)) is None else [rate]
-    lines = [[*(key.rsplit(".", 1)[-1] for key in rows[0].values), *schemes]]
+    lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
     lines += [
         [*values, *(_cell(of_scheme.get(scheme, [])) for scheme in schemes)]
         for values, of_scheme in found.items()
