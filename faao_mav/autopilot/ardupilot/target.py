@@ -35,9 +35,9 @@ class Curve:
 
     It leaves along the leg before, or as the spline before arrived, and arrives parallel to the
     line from its origin to the point after, or, before a straight leg, along that leg; where the
-    aircraft stops it has no tangent. No place is faster than its `allowed` (k,), m/s: in a bend
-    v² |curvature| is half the acceleration at most. `fly` sets the `speeds` (k,), m/s, and `times`
-    (k,), s from the beginning, of the target.
+    aircraft stops it has no tangent. No place is faster than its `allowed` (k,), m/s: at a speed v
+    in a bend v² |curvature| is half the acceleration at most. `fly` sets the `speeds` (k,), m/s,
+    with which the target passes the points, and when, `times` (k,), s from the beginning.
     """
 
     def __init__(
@@ -121,7 +121,8 @@ class Target:
         early: Real = np.zeros(count)
         for _ in range(2):  # how early a leg begins depends on the speed at which the last one ends
             begun, planned, top = legs.speeds(in_force, told, np.roll(early, 1))
-            early[:-1] = _half_overlaps(legs, ways, top, begun) * joined[1:]
+            slowest = np.minimum(told[:-1], in_force[1:])
+            early[:-1] = _half_overlaps(legs, ways, top, begun, slowest) * joined[1:]
 
         curves = {
             k: Curve(k + 1, points, splines, stopping, limits, float(speeds[k]))
@@ -172,23 +173,25 @@ class Target:
         self.motion: Real = motion[:-1]
 
 
-def _half_overlaps(legs: StraightLegs, ways: Real, top: Real, begun: Real) -> Real:
+def _half_overlaps(legs: StraightLegs, ways: Real, top: Real, begun: Real, slowest: Real) -> Real:
     """Return h (m - 2,), s: each leg but the first begins 2 h before the one before it ends.
 
     The target moves by the sum of both, along the unit vectors `ways` (m - 1, 3). h is the largest,
     up to half of either's ramp, at which after h s of the overlap it is within the radius of the
-    point between them, and within the acceleration in a corner.
+    point between them, within the acceleration in a corner, and no faster than `slowest`, m/s.
     """
     ending, beginning = legs.ramp(top)[:-1], legs.ramp(begun)[1:]
     cosine, limits = np.sum(ways[:-1] * ways[1:], axis=1), legs.limits
 
     def excess(h: Real) -> Real:
-        left, _, brake = top[:-1] * ending.at(h)
-        gone, _, push = begun[1:] * beginning.at(h)
+        left, slow, brake = top[:-1] * ending.at(h)
+        gone, fast, push = begun[1:] * beginning.at(h)
         apart = left**2 + gone**2 - 2 * left * gone * cosine
+        speed = slow**2 + fast**2 + 2 * slow * fast * cosine
         turn = brake**2 + push**2 - 2 * brake * push * cosine
-        worst: Real = np.maximum(apart / limits.radius**2, turn / limits.corner**2)
+        limit = limits.radius**2, slowest**2, limits.corner**2
+        worst: Real = np.max(np.array([apart, speed, turn]) / np.broadcast_arrays(*limit), axis=0)
         return worst
 
     longest = np.minimum(ending.duration, beginning.duration) / 2
-    return largest(excess, np.ones(len(longest)), longest)
+    return largest(excess, np.full(len(longest), 1 + 1e-9), longest)
