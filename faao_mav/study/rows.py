@@ -95,14 +95,16 @@ def as_array(rows: Sequence[StudyRow]) -> NDArray[np.void]:
     >>> table["power_dbm"].tolist(), table["R_avg"].tolist()
     ([5, 10], [0.5, 1.0])
     """
-    records, columns = [as_dict(row) for row in rows], []
-    for name in records[0]:
-        values = [record[name] for record in records]
+    records, columns = [as_dict(row) for row in rows], {}
+    for name in dict.fromkeys(name for record in records for name in record):
+        values = [record.get(name) for record in records]
         missing = "" if any(isinstance(value, str) for value in values) else math.nan
-        columns.append(np.array([missing if value is None else value for value in values]))
-    names: Any = list(records[0])
-    table: NDArray[np.void] = np.rec.fromarrays(columns, names=names).view(np.ndarray)
-    return table
+        columns[name] = np.array([missing if value is None else value for value in values])
+    kinds = [(name, column.dtype, column.shape[1:]) for name, column in columns.items()]
+    made = np.empty(len(rows), kinds)
+    for name, column in columns.items():
+        made[name] = column
+    return made
 
 
 def append_row(row: StudyRow, directory: Path) -> None:
@@ -202,7 +204,6 @@ def comparison(rows: Sequence[StudyRow]) -> str:
 
 
 def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
-    varied = dict.fromkeys(key for row in rows for key in row.values)
     schemes = list(dict.fromkeys(row.scheme for row in rows))
     found: dict[tuple[str, ...], dict[str, list[float]]] = {}
     for row in rows:
@@ -210,6 +211,7 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
         values = tuple(json.dumps(value).strip('"') for value in row.values.values())
         rates = found.setdefault(values, {}).setdefault(row.scheme, [])
         rates += [] if (rate := getattr(row, measure)) is None else [rate]
+    varied = dict.fromkeys(key for row in rows for key in row.values)
     lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
     lines += [
         [*values, *(_cell(of_scheme.get(scheme, [])) for scheme in schemes)]

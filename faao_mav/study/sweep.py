@@ -109,7 +109,8 @@ def _range(text: str, option: str) -> list[float]:
     try:
         start, stop, step = (Decimal(part.strip()) for part in text.split(":"))
         steps = (stop - start) / step
-        fine = steps >= 0 and all(math.isfinite(float(each)) for each in (start, stop, 1 / step))
+        numbers = start, stop, step, 1 / step
+        fine = steps >= 0 and all(math.isfinite(float(each)) for each in numbers)
     except (ArithmeticError, ValueError):
         fine = False
     if not fine:
@@ -118,9 +119,9 @@ def _range(text: str, option: str) -> list[float]:
             "that come from start to stop"
         )
     _check_count(steps, option)
-    numbers = [start + k * step for k in range(math.floor(steps) + 1)]
+    values = [start + k * step for k in range(math.floor(steps) + 1)]
     whole = all(part == part.to_integral_value() for part in (start, step))
-    return [int(number) if whole else float(number) for number in numbers]
+    return [int(value) if whole else float(value) for value in values]
 
 
 def _check_count(count: Decimal | int, what: str) -> None:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from conftest import PATIENCE, SMALL, edited
 from distributed import LocalCluster
@@ -25,7 +26,7 @@ from faao_mav.plan import parse_plan
 from faao_mav.report.style import save_figure
 from faao_mav.study import StudyRow, load_rows, make_cases, parse_vary, run_study
 from faao_mav.study.figure import study_figure
-from faao_mav.study.rows import comparison
+from faao_mav.study.rows import as_array, comparison, table
 
 FEW = {"radio.fading": "none", "optimizer.starts": ["straight"], "flight.time_step": 1}
 QUICK = edited(SMALL, FEW)
@@ -255,6 +256,16 @@ def test_rates_and_routes_are_drawn_the_same_each_time(
     for kind, rows in (("trajectories", failed), ("delivered", whole[1][:1])):
         with pytest.raises(InputError, match="nothing to draw"):
             study_figure(rows, parse_plan(QUICK), kind)
+
+
+def test_rows_of_several_studies_or_of_none_are_one_table() -> None:
+    rows = [StudyRow("", {"end": [1, 2]}, "faao", 0), StudyRow("", {"end": [3, 4]}, "zf", 0)]
+    assert as_array(rows)["end"].tolist() == [[1, 2], [3, 4]]
+    rows = [StudyRow("", {"H": 60}, "faao", 0), StudyRow("", {"power_dbm": 5}, "zf", 0)]
+    assert np.isnan(as_array(rows)["H"]).tolist() == [False, True]
+    assert table(rows).startswith("H,power_dbm,scheme,")
+    for empty in (as_array(()), table(()).splitlines()[1:]):
+        assert len(empty) == 0
 
 
 def test_what_causality_costs_is_drawn() -> None:

@@ -63,6 +63,7 @@ def test_what_cannot_be_varied_is_said() -> None:
         ("flight.duration=1:2:0", "no range"),
         ("flight.duration=1:2:-1", "steps that come from start to stop"),
         ("flight.duration=1:inf:1", "no range"),
+        ("flight.duration=1:2:inf", "no range"),
         ("flight.duration=0:1:1e-9", "1e+09 rows; a study has at most 100,000"),
         ("flight.duration=0:1e999999:1e-999999", "no range"),
         ("flight.duration=1e999999:1e999999:1", "no range"),
