@@ -83,7 +83,7 @@ def _in_order(mission: Mission) -> Iterator[tuple[int, MissionItem]]:
         item, steps = mission.items[index], steps + 1
         if item.command in JUMPS and math.isfinite(item.params[0]):
             repeats, target = item.params[1], jump_target(mission.items, index)
-            more = left.setdefault(index, int(repeats) if 0 <= repeats < _MOST_STEPS else _REPEATS)
+            more = left.setdefault(index, int(repeats) if 0 <= repeats < math.inf else _REPEATS)
             if more > 0 and target is not None:
                 left[index] -= 1
                 index = target

@@ -196,6 +196,15 @@ def test_radii_are_a_metre_at_least_and_none_narrows_in_a_corner() -> None:
 # ---- ArduPlane
 
 
+def test_the_demanded_airspeed_changes_as_total_energy_control_lets_it() -> None:
+    """The autopilot's log shows 0.80 m/s², and 1.65 m/s² with TECS_SINK_MIN 3 and cruise 16."""
+    rates = ArduPlane(cruise_speed=22.0).speed_rates
+    assert rates.fall == pytest.approx(0.80, abs=0.01)
+    assert rates.power / 17.7 == pytest.approx(1.38, abs=0.01)
+    rates = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates
+    assert rates.fall == pytest.approx(1.65, abs=0.01)
+
+
 @settings(max_examples=8)
 @given(speed=st.floats(0, 8), degrees=st.floats(0, 360))
 def test_a_wind_shifts_the_velocity_and_the_track_is_kept(speed: float, degrees: float) -> None:

@@ -164,6 +164,8 @@ def test_jumps_are_followed() -> None:
         assert visits(track, 60, 0) == 1
         assert track.position[-1] == pytest.approx([60, 60, 30], abs=ARRIVED)
     assert flown("waypoint:20,0,30 waypoint:0,0,30 4*jump=1,-1").t[-1] < 86_400
+    with pytest.raises(InputError, match="more than"):
+        flown("waypoint:100,0,30 waypoint:0,0,30 jump=1,5000")
 
 
 def test_waits() -> None:
