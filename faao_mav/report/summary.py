@@ -319,8 +319,8 @@ def _fenced(result: Result) -> Iterator[Line]:
     if (fence := result.fence) is None:
         return
     zones = fence["zones"]
-    more = ["..."] if len(zones) > _MOST_ZONES else []
-    yield "fence", ", ".join([*zones[:_MOST_ZONES], *more])
+    more = f" and {len(zones) - _MOST_ZONES} more" if len(zones) > _MOST_ZONES else ""
+    yield "fence", f"{', '.join(zones[:_MOST_ZONES])}{more}"
     yield from (("", note) for note in fence["notes"])
     kept = f"the plan keeps {fence['planned_clearance']:.1f} m (margin {fence['margin']:g} m)"
     if fence["predicted_clearance"] is not None:

@@ -76,7 +76,8 @@ def _doubtful_values(radio: Radio) -> Iterator[tuple[str, str]]:
         noise, key = dbm(watts), f"radio.{station}.noise_dbm"
         if noise > _MOST_NOISE:
             told = f"{key}: {noise:.4g} dBm is more noise than any receiver has"
-            yield told, "receivers have -80 to -120 dBm: is a minus missing?"
+            minus = ": is a minus missing?" if noise > 0 else ""
+            yield told, f"receivers have -80 to -120 dBm{minus}"
         elif noise < thermal - _COOLED:
             less = f"less than thermal noise in {band_mhz:g} MHz ({thermal:.0f} dBm)"
             density = "if it is a density (dBm/Hz), add 10 log10 of the bandwidth in Hz"
