@@ -79,7 +79,8 @@ def _doubtful_values(radio: Radio) -> Iterator[tuple[str, str]]:
             minus = ": is a minus missing?" if noise > 0 else ""
             yield told, f"receivers have -80 to -120 dBm{minus}"
         elif noise < thermal - _COOLED:
-            less = f"less than thermal noise in {band_mhz:g} MHz ({thermal:.0f} dBm)"
+            wide = f"{band_mhz:g} MHz" if radio.bandwidth_mhz else "even 1 kHz"
+            less = f"less than thermal noise in {wide} ({thermal:.0f} dBm)"
             density = "if it is a density (dBm/Hz), add 10 log10 of the bandwidth in Hz"
             yield f"{key}: {noise:.4g} dBm is {less}", density
     powers = {"base_station": radio.base_station.power, "relay": radio.relay.power}

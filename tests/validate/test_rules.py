@@ -49,12 +49,17 @@ def test_a_doubtful_radio_is_told_with_the_likely_slip() -> None:
     density = "if it is a density (dBm/Hz), add 10 log10 of the bandwidth in Hz"
     for trips, passes, action in (
         ({noise: 91, **band}, {noise: -91}, "is a minus missing?"),
+        ({noise: -30}, {noise: -91}, "receivers have -80 to -120 dBm"),
         ({noise: -174, **band}, {noise: -140}, density),
+        ({noise: -174}, {noise: -140}, density),
         ({noise: -110, **band}, {noise: -101, **band}, ""),
         ({power: 100}, {power: 40}, ""),
     ):
         check("radio-values", judged(trips), None, judged(passes))
-        assert action in judged(trips).by("radio-values")[0].action
+        told = judged(trips).by("radio-values")[0]
+        assert action in told.action
+        assert ("minus" in told.action) == (trips.get(noise, 0) > 0)
+        assert ("even 1 kHz" in told.message) == (trips == {noise: -174})
 
 
 def test_a_route_beyond_what_the_gain_was_measured_at_is_told() -> None:
