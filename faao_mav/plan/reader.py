@@ -285,8 +285,6 @@ def _lines(details: Sequence[ErrorDetails], files: Mapping[tuple[str, ...], str]
             problem = f"missing; give {accepted}"
         elif kind == "unexpected_keyword_argument":
             problem = f"unknown key; {_nearest(known, *keys)}"
-        elif kind == "invalid_key":
-            problem = f"a key has to be a word, not {quote(value)}"
         elif kind == "told":
             problem = detail["msg"]
         elif kind == "value_error":

@@ -12,9 +12,10 @@ from typing import Any, ClassVar
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer
+from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
-from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from ruamel.yaml.representer import SafeRepresenter
 from ruamel.yaml.resolver import VersionedResolver
 
@@ -94,6 +95,22 @@ class _PlainComposer(Composer):
         return node
 
 
+class _UniqueKeys(SafeConstructor):
+    def check_mapping_key(
+        self, node: MappingNode, key_node: Node, mapping: Any, key: Any, value: Any
+    ) -> bool:
+        del node, value
+        problem = ""
+        if not isinstance(key, str):
+            shown = f", not {key_node.value}" if isinstance(key_node.value, str) else ""
+            problem = f"a key has to be a word{shown}"
+        elif key in mapping:
+            problem = f"the key '{key}' stands twice"
+        if problem:
+            raise MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
+        return True
+
+
 _LINES = re.compile(r"([!-~][ -~]*\n){2,}")
 """Text of several lines that stands in a block as it is."""
 
@@ -115,7 +132,7 @@ def _yaml() -> Any:
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.long = {}
     yaml.Representer = _Blocks
-    yaml.Resolver, yaml.Composer = _CoreResolver, _PlainComposer
+    yaml.Resolver, yaml.Composer, yaml.Constructor = _CoreResolver, _PlainComposer, _UniqueKeys
     return yaml
 
 
