@@ -22,7 +22,10 @@ _QUICKEST, _FIRST, SLOWEST = 0.02, 0.25, 1.5
 vehicle (ArduPlane) turns 50 times a second; while it is not known how long answers take, and at the
 latest, by the guide."""
 
-_LONGEST = 0.5  # Seconds after which it is put again at the latest on a quick link; chosen.
+_LONGEST = 0.5
+"""Seconds after which it is put again at the latest on a quick link. Chosen: without it, of 50
+parameters over a link that loses a fifth each way one stays unread in 4 % of all readings."""
+
 _GROWTH = 1.25  # By how much the wait grows with each question that has to be put again; chosen.
 
 
