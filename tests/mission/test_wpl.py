@@ -159,9 +159,12 @@ def test_the_fence_of_an_earlier_mission_goes_a_users_own_stays(tmp_path: Path) 
 def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
     for name, content, told in (
         ("flight", b"", "no ending; expected a name that ends in .waypoints"),
+        ("x.kml", b"<kml>", "KML is written for drawing and lacks"),
+        ("x.txt", None, "cannot be read: No such file"),
         ("x.waypoints", b"#" * 16_000_001, "more than 16,000,000 bytes"),
         ("x.plan", b"[" * 100_000, "nested too deep for a plan"),
     ):
-        (tmp_path / name).write_bytes(content)
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
         with pytest.raises(MissionFileError, match=f"{name}: {told}"):
             read_mission(tmp_path / name)

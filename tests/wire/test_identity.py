@@ -17,6 +17,7 @@ from faao_mav.fly.fly import fly_mission
 from faao_mav.fly.preflight import Flight
 from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.wire import download, upload
+from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec, message_id, sender_of
 from faao_mav.wire.discover import Heard, choose, discover
 from faao_mav.wire.machine import Script
@@ -301,3 +302,25 @@ def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> N
     hurry(monkeypatch)
     (problem,) = upload(a_mission(5), "udpin:0.0.0.0:1", system=1).problems
     assert "it speaks MAVLink 1 only: set its port to MAVLink 2: SERIALn_PROTOCOL 2" in problem
+
+
+def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    """ArduPilot with SERIALn_PROTOCOL 1 or PX4 with MAV_PROTO_VER 1."""
+    pack = Codec.pack
+
+    def old(codec: Codec, message: Message) -> bytes:
+        packet = pack(codec, message)
+        if codec.address != VEHICLE:
+            return packet
+        decoded = common.MAVLink(None).decode(bytearray(packet))
+        if hasattr(decoded, "mission_type"):
+            decoded.mission_type = 0  # MAVLink 1 has no such field
+        return bytes(decoded.pack(common.MAVLink(None, 1, 1), force_mavlink1=True))
+
+    monkeypatch.setattr(Codec, "pack", old)
+    in_the_air(monkeypatch, {HERE: a_mock(rate=0.0)})
+    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1).verified
+    hurry(monkeypatch)
+    held = holdings("udpin:0.0.0.0:1", system=1)
+    assert len(held.mission.items) == 5
+    assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
 from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, vehicle_of
 
 from faao_mav.errors import InputError
@@ -118,7 +119,7 @@ def message_of(packet: Packet) -> Any:
 
 
 def test_messages_survive_the_wire() -> None:
-    """But for one that is damaged."""
+    """But for one that is damaged; one that is not known says nothing, and is logged."""
     sender, receiver = Codec(VEHICLE), Codec(GROUND_STATION)
     sent = [sender.pack(message) for message in MESSAGES]
     found = [packet for data in sent for packet in receiver.parse(data)]
@@ -127,3 +128,5 @@ def test_messages_survive_the_wire() -> None:
     damaged = bytearray(sent[0])
     damaged[12] ^= 1
     assert receiver.parse(bytes(damaged)) == []
+    unknown = common.MAVLink_vfr_hud_message(0, 0, 0, 0, 0, 0).pack(common.MAVLink(None, 1, 1))
+    assert receiver.parse(b"noise" + unknown) == [Packet(unknown, None)]
