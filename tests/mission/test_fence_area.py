@@ -51,9 +51,9 @@ def test_the_shortest_way_is_the_shortest_of_all_that_turn_at_corners(
     assert shapely.LineString(way).length >= length[0, 1] * (1 - 1e-9)
 
 
-def test_the_way_about_circles_keeps_off_their_arcs_and_finds_the_only_gap() -> None:
+def test_the_way_about_circles_keeps_off_their_arcs_and_finds_the_narrow_gaps() -> None:
     start, end = np.array([-90.0, 0.0]), np.array([90.0, 0.0])
-    for gap, walled, length in ((1.0, False, 180.0), (0.02, True, 180.0), (0.02, False, 281.6)):
+    for gap, walled, length in ((1.0, False, 180.0), (0.02, True, 180.0), (0.02, False, 180.0)):
         discs = [shapely.Point(0, y).buffer(50 - gap / 2, quad_segs=64) for y in (-50, 50)]
         ends = 60 if walled else 500
         area = FreeArea(shapely.box(-100, -ends, 100, ends) - shapely.union_all(discs))
