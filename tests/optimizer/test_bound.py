@@ -137,6 +137,10 @@ def test_no_optimised_flight_is_above_the_bounds(
     assert reached <= min(one.bounds) <= 1.6 * reached
 
 
+def test_a_wall_lowers_the_bound(bounded: Callable[[str], Bounded]) -> None:
+    assert bounded("fence").bounds[0] < bounded("delivered").bounds[0] - 1e-3
+
+
 @pytest.mark.parametrize("kind", ["R_avg", "free ends", "fast"])
 @settings(max_examples=10)
 @given(seed=st.integers(0, 2**31))

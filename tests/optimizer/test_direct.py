@@ -9,8 +9,11 @@ from conftest import FLYABLE, MISSIONS, MakePlan, edited
 
 from faao_mav import parse_plan
 from faao_mav.errors import PlanError
+from faao_mav.optimizer.design import design
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
+from faao_mav.optimizer.rates import table_rate
+from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.rough import rough_flight
 from faao_mav.optimizer.solution import Progress, load_solution, save_solution
 from faao_mav.plan import Plan, read_plan
@@ -201,3 +204,20 @@ def test_a_rough_flight_keeps_its_limits_and_comes_near_the_finished_one(text: s
         if asked.keep_in is not None:
             assert asked.keep_in.clearance(flight.w) >= 1 - 1e-6
         assert 0.9 * finished < flight.delivered_rate < finished + 1e-3
+
+
+def test_plans_with_other_stations_share_their_tables(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, table = [], table_rate._made
+
+    def counted(*args: Any) -> table_rate.Table:
+        made.append(args)
+        return table(*args)
+
+    monkeypatch.setattr(table_rate, "_made", counted)
+    monkeypatch.setattr(table_rate, "_tables", {})
+    for east in (60, 61, 62):
+        problem = build_problem(
+            parse_plan(BASE).changed({"radio.ground_user.position": [east, 60]})
+        )
+        rate_field(problem, design(problem.plan))
+    assert len(made) == 1  # both links have it

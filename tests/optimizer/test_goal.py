@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from random_flights import random_flight
 
 from faao_mav.errors import InfeasibleError
+from faao_mav.optimizer import goal as goal_module
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import least_number
 from faao_mav.optimizer.kinematics import Trajectory
@@ -241,6 +242,21 @@ def test_the_least_energy_is_below_that_of_the_whole_flight(
     assert label == "goal"
     assert told.startswith(f"least energy for {asked:.5g} megabytes: {used(found):.4g} Wh in ")
     assert Result(found).as_dict()["goal"]["energy_wh"] == used(found)
+
+
+def test_where_no_less_energy_will_do_every_share_is_refused(
+    whole: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: list[int] = []
+
+    def none(_: goal_module._Flights, number: int) -> Solution:
+        tried.append(number)
+        raise InfeasibleError("none")
+
+    monkeypatch.setattr(goal_module._Flights, "of_share", none)
+    found = optimize(COPTER.changed({"goal": {"rate": 0.1, "minimise": "energy"}}))
+    assert max(tried) == round(1 / goal_module.ENERGY_SHARE) - 1
+    assert used(found) == used(whole)
 
 
 def test_too_little_energy_says_what_the_straight_flight_takes() -> None:

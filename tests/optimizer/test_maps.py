@@ -26,6 +26,7 @@ from faao_mav.optimizer.rough import rough_flight
 from faao_mav.optimizer.search.best_rates import best_rates
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import map_bound, most_gain
+from faao_mav.optimizer.search.over_map import queue_sweep
 from faao_mav.optimizer.search.queue_sweep import QueueSweep
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
@@ -259,6 +260,12 @@ def test_no_flight_goes_through_ground(
 
     assert told(found.w) == ""
     assert told(straight.w).startswith("in the ground under the map of the gain at [")
+
+
+def test_steps_of_long_slots_are_few(grounded: Callable[[dict[str, Any]], Plan]) -> None:
+    problem = build_problem(grounded({"flight.duration": 60, "flight.time_step": 5}))
+    sweep = queue_sweep(problem, rate_field(problem, design(problem.plan)), 5_000)
+    assert sweep.steps.targets.shape[1] < 300
 
 
 def test_a_place_in_ground_is_named(grounded: Callable[[dict[str, Any]], Plan]) -> None:

@@ -140,6 +140,16 @@ def test_an_archive_that_unpacks_to_any_size_is_refused(
         tracemalloc.stop()
 
 
+def test_a_directory_without_an_end_is_not_read(solution: Solution, tmp_path: Path) -> None:
+    path = tmp_path / "result.npz"
+    save_solution(solution, path)
+    with zipfile.ZipFile(path, "a") as packed:
+        for number in range(3000):
+            packed.writestr(f"{number}.npy", b"")
+    with pytest.raises(InputError, match="not a result of faao-mission --save"):
+        load_solution(path)
+
+
 def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
     assert replace(solution, P_B=1.1 * solution.P_B).residuals()[
         "(13b) power of the base station"
