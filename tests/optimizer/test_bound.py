@@ -137,8 +137,12 @@ def test_no_optimised_flight_is_above_the_bounds(
     assert reached <= min(one.bounds) <= 1.6 * reached
 
 
-def test_a_wall_lowers_the_bound(bounded: Callable[[str], Bounded]) -> None:
-    assert bounded("fence").bounds[0] < bounded("delivered").bounds[0] - 1e-3
+def test_a_zone_over_a_station_lowers_the_bound(bounded: Callable[[str], Bounded]) -> None:
+    free = bounded("delivered")
+    zone = {"fence.exclusion": [{"center": [0, 0], "radius": 30}]}
+    fenced = build_problem(free.plan.changed(zone))
+    found, most = (map_bound(each, free.best, cells=1000) for each in (fenced, free.problem))
+    assert found < most - 1e-2
 
 
 @pytest.mark.parametrize("kind", ["R_avg", "free ends", "fast"])

@@ -71,6 +71,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     ("autopilot", "parameters", "expected"),
     [
         ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_TYPE": 9, "FENCE_ALT_MAX": 60}, 60.0),
+        ("ardupilot", {"FENCE_ENABLE": 0, "FENCE_ALT_MAX": 60}, 120.0),
         ("px4", {"GF_MAX_VER_DIST": 50.5}, 50.5),
     ],
 )

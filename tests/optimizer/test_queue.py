@@ -15,6 +15,7 @@ from faao_mav.errors import InputError
 from faao_mav.optimizer.interior.maximize import maximize, objective
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import load_solution, save_solution
@@ -95,6 +96,11 @@ def test_small_buffers_converge(duplex: str, buffer: int) -> None:
     solution = optimize(SAMPLE.changed(changes | {"radio.duplex": duplex}))
     assert solution.converged
     assert still_gained(solution) < 1e-4
+
+
+def test_a_buffer_of_megabytes_is_one_of_bits_per_hertz(small_plan: MakePlan) -> None:
+    plan = small_plan({"radio.bandwidth_mhz": 2, "radio.relay.buffer_mbytes": 1})
+    assert build_problem(plan).relay.buffer == 4.0
 
 
 def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None:

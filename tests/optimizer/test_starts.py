@@ -53,6 +53,16 @@ def test_with_time_the_stations_are_visited_in_order_and_hovered_at() -> None:
         assert near.sum() > 20
 
 
+def test_with_less_time_it_goes_as_far_as_it_can() -> None:
+    shares = []
+    for seconds in (75.0, 80.0, 90.0, 120.0):  # a stop on the way alone takes 5 s
+        flight = starts(kin(seconds), ["bs"], STATIONS)["bs"]
+        shares.append(np.linalg.norm(flight.w - STATIONS["bs"], axis=1).min())
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] > 100
+    assert shares[-1] < 1e-6
+
+
 def test_what_cannot_be_had_is_left_out() -> None:
     assert list(starts(kin(68.0), ["bs", "user"], STATIONS)) == ["straight"]
     across = kin(300, start_velocity=np.array([1.0, 1.0]))

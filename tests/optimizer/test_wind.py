@@ -63,6 +63,14 @@ def test_the_optimum_of_a_convex_problem_is_clarabels() -> None:
     assert -best.value == pytest.approx(float(peer.value), rel=1e-4, abs=1e-6)
 
 
+def test_the_frame_of_the_air_is_calm() -> None:
+    kin = replace(FREE, wind=(4.0, -3.0), min_speed=3.0, max_speed=20.0)
+    calm = kin.in_the_air()
+    flight = straight_flight(calm)
+    assert max(calm.residuals(flight).values()) < 1e-9
+    assert max(kin.residuals(kin.over_ground(flight)).values()) < 1e-9
+
+
 CHANGES = {
     "flight.duration": 70,
     "flight.time_step": 1,

@@ -42,7 +42,7 @@ _FIRST_PROXIMAL, _MORE_PROXIMAL = 1e-3, 8.0
 
 _FALL = 0.2
 """mu falls to this share when the scaled gradient is below mu. Measured on nine random plans with a
-least speed: below 3 and 10 mu one and four do not converge."""
+least speed: where it has to be below 3 or 10 mu, one or four do not converge."""
 
 _LEAST_GAP = 0.25
 """The complementarity gap per slot at the least mu, in tolerances. Chosen."""
