@@ -142,5 +142,5 @@ def minimize(objective: cp.Expression, constraints: list[Any]) -> cp.Problem:
         if problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
             return problem
         if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
-            break
+            raise SolverError("Clarabel calls a convex problem infeasible that has a solution")
     raise SolverError("Clarabel made no progress on a convex problem")
