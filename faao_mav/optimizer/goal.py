@@ -47,7 +47,8 @@ _PRECISION, _NEAR = 0.01, 0.15
 which durations are tried on both sides of that of a near energy. Chosen."""
 
 _COMPARED = 50
-"""Durations of straight flights, and airspeeds, of which the thriftiest is sought. Chosen."""
+"""Durations of straight flights of which the thriftiest is sought, and a tenth of the airspeeds.
+Chosen."""
 
 _ABOVE = 1e-4
 """The share by which an energy is above what a flight takes that is a start. Chosen: ten times what
@@ -205,7 +206,7 @@ class _Flights:
         step, tried = self.plan.flight.time_step, dict[int, Solution]()
         low, high = fewest_slots(self.plan), self.plan.flight.slots
         fastest = self.plan.max_ground_speed + math.hypot(*self.plan.wind)
-        airspeeds = np.linspace(self.plan.vehicle.min_speed, fastest, _COMPARED)
+        airspeeds = np.linspace(self.plan.vehicle.min_speed, fastest, 10 * _COMPARED)
         assert self.plan.power_model is not None  # goals of an energy have one
         least = self.plan.power_model.least_power(airspeeds)[1] + self.plan.radio.relay.power
         high = min(high, int(energy / (least * step)))

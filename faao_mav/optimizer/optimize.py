@@ -3,7 +3,7 @@
 Under the paper's law the lowest height is the best wherever the stations are; under a law with
 terms over the elevation, over a map or beside ground it is not, and it may have several local
 optima. Heights are tried at even distances, and those about the best ones to the end: each is a
-whole plan.
+whole plan, which begins with the flight of the last.
 """
 
 import math
@@ -14,6 +14,7 @@ from typing import Unpack
 import numpy as np
 
 from faao_mav.errors import InfeasibleError, InputError, PlanError
+from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import OwnParts, build_problem
 from faao_mav.optimizer.shadowing import shadowed
 from faao_mav.optimizer.solution import BestHeight, Observer, Solution, staged
@@ -26,6 +27,9 @@ _EVENLY, _REFINED = 9, 2
 
 _DECIMALS = 1
 """Decimals of a height, m: missions and aircraft keep no finer one. Chosen."""
+
+Solve = Callable[[Plan, Trajectory | None], Solution]
+"""How a plan of one height is solved, from the flight of a plan nearby where there is one."""
 
 
 def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[OwnParts]) -> Solution:
@@ -47,16 +51,21 @@ def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[Own
         raise InputError(f"{', '.join(parts)}: Algorithm 1 takes no parts of one's own")
     if isinstance(plan.flight.height, Heights):
 
-        def at_height(candidate: Plan) -> Solution:
+        def at_height(candidate: Plan, known: Trajectory | None) -> Solution:
             told = staged(observe, f"height {candidate.flight.altitude:g} m")
-            return _solved(candidate, told, **parts)
+            return _solved(candidate, told, known, **parts)
 
         return best_height(plan, at_height)
-    return _solved(plan, observe, **parts)
+    return _solved(plan, observe, None, **parts)
 
 
-def _solved(plan: Plan, observe: Observer | None, **parts: Unpack[OwnParts]) -> Solution:
-    """Return the solution of `plan`, of one height."""
+def _solved(
+    plan: Plan,
+    observe: Observer | None,
+    known: Trajectory | None,
+    **parts: Unpack[OwnParts],
+) -> Solution:
+    """Return the solution of `plan`, of one height; of plans without a goal from `known` too."""
     if plan.goal.minimise or plan.goal.maximise == "data":
         from faao_mav.optimizer.goal import reach_goal
 
@@ -68,15 +77,15 @@ def _solved(plan: Plan, observe: Observer | None, **parts: Unpack[OwnParts]) -> 
         return algorithm1(problem, observe=observe)
     from faao_mav.optimizer.direct import direct
 
-    return direct(problem, observe=observe)
+    return direct(problem, observe=observe, known=known)
 
 
-def best_height(plan: Plan, solve: Callable[[Plan], Solution]) -> Solution:
+def best_height(plan: Plan, solve: Solve) -> Solution:
     """Return the solution of `plan` at the best of its heights; it tells what other ones bring.
 
-    `solve` is given plans of one height: those of `flight.altitude` between the floor and the
-    ceiling of the vehicle's own fence. Raises `PlanError` where none is left, and what `solve`
-    raises where no height has a flight.
+    The heights are those of `flight.altitude` between the floor and the ceiling of the vehicle's
+    own fence. Raises `PlanError` where none is left, and what `solve` raises where no height has a
+    flight.
     """
     from scipy.optimize import minimize_scalar
 
@@ -87,8 +96,10 @@ def best_height(plan: Plan, solve: Callable[[Plan], Solution]) -> Solution:
     def worth(height: float) -> float:
         at = round(float(height), _DECIMALS)
         if at not in solved and at not in refused:
+            near = min(solved, key=lambda other: abs(other - at), default=None)
+            known = None if near is None else solved[near].trajectory
             try:
-                solved[at] = solve(plan.changed({"flight.altitude": at}))
+                solved[at] = solve(plan.changed({"flight.altitude": at}), known)
             except (InfeasibleError, PlanError) as error:
                 refused[at] = error
         return _worth(solved[at]) if at in solved else -math.inf

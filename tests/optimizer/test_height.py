@@ -7,6 +7,7 @@ import pytest
 
 from faao_mav import optimize, parse_plan
 from faao_mav.errors import PlanError
+from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.optimize import best_height
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
@@ -50,13 +51,16 @@ def test_without_terms_over_the_elevation_the_lowest_is_the_best() -> None:
 
 
 def test_the_better_of_two_local_optima_is_found() -> None:
-    def peaks(candidate: Plan) -> Solution:
+    def peaks(candidate: Plan, known: Trajectory | None) -> Solution:
+        asked.append(known is not None)
         height = candidate.flight.altitude
         power = max(-abs(height - 35), 15 - abs(height - 93.4))
         return optimize(candidate.changed(dict.fromkeys(ALIASES[POWER], power)))
 
+    asked: list[bool] = []
     found = best_height(plan(), peaks)
     assert found.plan.flight.altitude == pytest.approx(93.4, abs=0.5)
+    assert asked == [False, *[True] * (len(asked) - 1)]  # each begins with a flight nearby
 
 
 @pytest.fixture
