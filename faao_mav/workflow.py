@@ -342,8 +342,7 @@ def plan_mission(
     if bound:
         from faao_mav.optimizer.search.bound import upper_bound
 
-        reached = solution.delivered_rate if plan.radio.causal else solution.rates.R_avg
-        ceiling = upper_bound(solution.problem, reached, observe=observe)
+        ceiling = upper_bound(solution.problem, solution.maximised, observe=observe)
     return replace(
         result,
         fresh=fresh_rates(solution),

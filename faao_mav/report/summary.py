@@ -200,8 +200,7 @@ def _optimum(result: Result, timed: bool) -> Iterator[Line]:
     """Yield how near the flight is to the best, what limits it, and how it was found."""
     solution, radio = result.solution, result.solution.plan.radio
     if result.bound is not None:
-        reached = solution.delivered_rate if radio.causal else solution.rates.R_avg
-        value = result.bound.value
+        reached, value = solution.maximised, result.bound.value
         short = 100 * (1 - reached / value) if value else 0.0
         most = f"at most {_told_rate(value, radio.bandwidth_mhz)} (estimate)"
         yield "bound", f"within {short:.2g} % of the best that any route can do: {most}"
@@ -279,7 +278,7 @@ def _brought(solution: Solution) -> str:
         return f"{' and '.join(dict.fromkeys(f'{dbm(power):.2f}' for power in plan.powers))} dBm"
     if goal.maximise == "data":
         return f"{solution.delivered_rate * plan.flight.duration:.5g} bit/Hz"
-    return f"{solution.delivered_rate if plan.radio.causal else solution.rates.R_avg:.4f} bit/s/Hz"
+    return f"{solution.maximised:.4f} bit/s/Hz"
 
 
 def _asked(plan: Plan, rate: float) -> str:

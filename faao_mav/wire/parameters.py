@@ -25,9 +25,8 @@ _INT32 = 6  # MAV_PARAM_TYPE of whole numbers of 32 bits.
 _AT_ONCE = 10  # Names that are asked for at once: half of ArduPilot's queue for them. Chosen.
 
 _SILENCE = 4.0
-"""Seconds without a new answer after which no more are asked for, or set. Chosen: of 50 parameters
-that are read, over a link that loses a fifth each way, one stays unread in 1.4 % of all readings; a
-name that the vehicle does not know costs these seconds."""
+"""Seconds without a new answer after which no more are asked for, or set. Chosen: a name that the
+vehicle does not know costs these seconds; what they leave unread says `machine._LONGEST`."""
 
 
 @dataclass(frozen=True, slots=True)
