@@ -132,6 +132,7 @@ def _check_plan(problem: Problem) -> None:
         (plan.radio.fading == "ergodic", "radio.fading: ergodic", "it plans for one known draw"),
         (inputs == "gaussian", "optimizer.inputs: gaussian", "its sums are those of an alphabet"),
         (rate != "cutoff", f"optimizer.rate: {rate}", "its sums are those of the cutoff rate"),
+        (plan.vehicle.min_speed > 0, "vehicle.min_speed", "the paper's aircraft can hover"),
         (other_gain, "radio.gain", "its Proposition 1 is of a gain by the distance squared"),
     ):
         if wrong:
@@ -194,7 +195,7 @@ def optimize_trajectory(
 
     def solved(last: Trajectory, gap: float) -> Trajectory:
         """Solve (27) about the flight `last`, with (xi - floor) / gap as the objective."""
-        flight, objective = flight_variables(problem.kinematics, last.v), cp.Variable()
+        flight, objective = flight_variables(problem.kinematics), cp.Variable()
         constraints: list[Any] = list(flight.constraints)
         for s in sums:
             sum_lb, quadratic = convex_bound(s, last.w, flight.w, gap)

@@ -11,11 +11,8 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.errors import SolverError
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
-
-_INSIDE = 1e-7  # by which the least speed is raised, for what the solver leaves open
 
 # The variables are scaled here already: Clarabel's own equilibration of the many exponential
 # cones more often stalls it than helps. Where it does stall, shorter steps mostly get through.
@@ -48,13 +45,8 @@ class FlightVariables:
         return kin.integrate(start, np.asarray(self.a.value) * kin.max_acceleration)
 
 
-def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariables:
-    """Return new variables under (11), (12), (13d)-(13f).
-
-    `about`, feasible velocities (N + 2, 2) in m/s, adds the least speed: v(n) about v_i(n) on the
-    far side of the half-plane v(n)^T v_i(n) >= v_min ||v_i(n)||, which is inside the true set.
-    Without it the least speed is left out.
-    """
+def flight_variables(kin: Kinematics) -> FlightVariables:
+    """Return new variables under (11), (12), (13d)-(13f)."""
     n, dt = kin.slots, kin.time_step
     w, v, a = (cp.Variable((n, 2)) for _ in range(3))
     advance = kin.max_speed * dt / LENGTH
@@ -69,54 +61,14 @@ def flight_variables(kin: Kinematics, about: Real | None = None) -> FlightVariab
         cp.norm(a[kin.first_bounded_acceleration :], axis=1) <= 1,
         a[-1] == 0,
     ]
-    wind = np.array(kin.wind) / kin.max_speed
     if np.isfinite(kin.max_airspeed):
+        wind = np.array(kin.wind) / kin.max_speed
         constraints.append(cp.norm(v - wind, axis=1) <= kin.max_airspeed / kin.max_speed)
     if kin.start_velocity is not None:
         constraints.append(v[0] == kin.start_velocity / kin.max_speed)
     if kin.end_velocity is not None:
         constraints.append(v[-1] == kin.end_velocity / kin.max_speed)
-    if about is not None and kin.min_speed > 0:
-        ahead = about - kin.wind
-        ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
-        free = slice(
-            0 if kin.start_velocity is None else 1,
-            kin.slots if kin.end_velocity is None else kin.slots - 1,
-        )
-        # given end velocities keep it already: twice said, they would leave no interior
-        least = kin.min_speed / kin.max_speed * (1 + _INSIDE)
-        along = cp.sum(cp.multiply(ahead, v - wind), axis=1)
-        constraints.append(along[free] >= least)
-        if np.isfinite(kin.most_fall):
-            constraints += _slow_to_change(kin, about, along, v - wind)
-        if kin.turn_binds:
-            constraints.append(_slow_to_turn(kin, about, v, a))
     return FlightVariables(kin, w, v, a, constraints)
-
-
-def _slow_to_change(kin: Kinematics, about: Real, along: Any, airspeed: Any) -> list[Any]:
-    """Return that the airspeed changes no faster than thrust and drag let it, convex and inside.
-
-    `along` (N + 2,) is the part of `airspeed` along that of the velocities `about`: never above its
-    size, which it is to first order.
-    """
-    speed, first = np.hypot(*(about - kin.wind).T) / kin.max_speed, kin.first_bounded_acceleration
-    fall = kin.most_fall * kin.time_step / kin.max_speed
-    rise = 2 * kin.most_power * kin.time_step / kin.max_speed**2
-    square = 2 * cp.multiply(speed, along) - speed**2
-    return [
-        (cp.norm(airspeed[:-1], axis=1) - along[1:])[first:] <= fall,
-        (cp.sum(cp.square(airspeed[1:]), axis=1) - square[:-1])[first:] <= rise,
-    ]
-
-
-def _slow_to_turn(kin: Kinematics, about: Real, v: cp.Variable, a: cp.Variable) -> Any:
-    """Return that turns keep `most_turn`, convex and inside: c^2 to first order about `about`."""
-    at, first = about / kin.max_speed, kin.first_bounded_acceleration
-    square = cp.sum(2 * cp.multiply(at, v) - at**2, axis=1)
-    counts = (square[:-1] + square[1:]) / 2 + (kin.wind_in_turns / kin.max_speed) ** 2
-    share = (kin.most_turn * kin.max_speed / kin.max_acceleration) ** 2
-    return (cp.sum(cp.square(a[:-1]), axis=1) - share * counts)[first:] <= 0
 
 
 def minimize(objective: cp.Expression, constraints: list[Any]) -> cp.Problem:

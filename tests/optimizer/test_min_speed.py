@@ -11,7 +11,7 @@ from conftest import MakePlan
 from test_interior import STATIONS, bpsk, gaussian, links, plane, reward, worst
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InfeasibleError
+from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.kinematics import Kinematics, kinematics
 from faao_mav.optimizer.optimize import optimize
@@ -203,12 +203,6 @@ def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: Make
     assert residuals["minimum speed"] < 1e-6
 
 
-def test_algorithm_1_keeps_it_too(paper_plan: MakePlan, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("faao_mav.optimizer.algorithm1._MAX_STEPS", 3)
-    plan = paper_plan(TURNING | {"vehicle.min_speed": 9, "optimizer.max_iterations": 1})
-    solution = optimize(plan)
-    residuals = solution.residuals()
-    assert {"turn", "minimum speed", "fall of airspeed"} <= set(residuals)
-    assert max(residuals.values()) < 1e-6
-    assert solution.rates.R_avg > solution.history[0]
-    assert turned(solution).max() > 0.99
+def test_algorithm_1_is_for_aircraft_that_can_hover(paper_plan: MakePlan) -> None:
+    with pytest.raises(PlanError, match=r"vehicle\.min_speed is not for algorithm1"):
+        optimize(paper_plan({"vehicle.min_speed": 9}))
