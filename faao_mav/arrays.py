@@ -12,6 +12,9 @@ Flags: TypeAlias = NDArray[np.bool_]
 RealOrComplex: TypeAlias = Real | Complex
 
 
+CACHE = 1 << 17
+"""Numbers of a megabyte: work on large arrays goes through parts that stay in a cache. Chosen."""
+
 PACKED = np.array([[0, 1], [1, 2]])
 """Which of the entries xx, xy, yy stand where in the matrix."""
 

@@ -21,14 +21,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
+from faao_mav.arrays import CACHE, Complex, Integers, Real, RealOrComplex
 from faao_mav.radio.constellation import coordinates, difference_classes, outer
 from faao_mav.radio.mutual_information import NODES, mutual_information
 from faao_mav.radio.precoder import bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.rate import ClassSum, Measure, class_sum
-
-_CHUNK = 4_000_000
-"""Numbers in memory at once while channels are searched together: 32 MB. Chosen."""
 
 _FAINT = 1e-4
 """Trace of the gain matrix G below which the rate is proportional to the power: the best P is then
@@ -121,7 +118,7 @@ def best_precoders(
         P = np.empty((len(flat), N, N), dtype=np.complex128)
         given = None if start is None else np.reshape(start, (-1, N, N)).astype(np.complex128)
         numbers = (1 if start is None else 20) * (12 * N**4 + 8 * S * N**2)
-        step = max(1, _CHUNK // numbers)
+        step = max(1, 32 * CACHE // numbers)
         for first in range(0, len(flat), step):
             part = slice(first, first + step)
             begin = None if given is None else given[part]

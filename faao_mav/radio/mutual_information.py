@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Integers, Real, RealOrComplex
+from faao_mav.arrays import CACHE, Complex, Integers, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import constellation, symbol_vectors
 
@@ -37,9 +37,6 @@ smallest P_2 figures over 2^5 to 2^10 points in 3 to 9 dimensions."""
 
 _RAREST = 1e-9
 """Probability of the noises beyond the largest that is used, 6 standard deviations. Chosen."""
-
-_CHUNK = 1 << 18
-"""Likelihoods in memory at once: 2 MB, which stay in a processor's cache. Chosen."""
 
 _NOISES = 128
 """Noises handled together at least, which keeps the inner loops long. Chosen."""
@@ -128,8 +125,8 @@ def mutual_information(
     # ||y - s_k||² expanded, all exponents are one product of matrices. That of the vector sent is
     # -||z||² / 2: the sum never underflows for noises that are drawn.
     # Long rows of noises keep the inner loops long; the rest of the room goes to channels.
-    group = max(1, _CHUNK // (len(points) * min(q, _NOISES)))
-    step = max(1, _CHUNK // (len(points) * group))
+    group = max(1, 2 * CACHE // (len(points) * min(q, _NOISES)))
+    step = max(1, 2 * CACHE // (len(points) * group))
     for first in range(0, len(maps), group):
         channels = np.arange(first, min(first + group, len(maps)))
         s = points @ maps[channels]

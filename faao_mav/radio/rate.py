@@ -16,7 +16,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.arrays import CACHE, Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 from faao_mav.radio.constellation import (
     DifferenceClasses,
@@ -28,12 +28,6 @@ from faao_mav.radio.mutual_information import mutual_information
 
 Measure: TypeAlias = Literal["cutoff", "mutual_information"]
 """The name of the rate that counts."""
-
-_PAIRS = 1 << 17
-"""Channels with their precoders taken together, which bounds the memory. Chosen."""
-
-_BLOCK = 1 << 17
-"""Exponents in memory at once, 1 MB: they stay in the cache. Chosen."""
 
 _NEAREST = 2048
 """Classes, the nearest first, among which the smallest exponent is looked for. Chosen."""
@@ -104,8 +98,8 @@ def cutoff_rate(
         for M in (H, P)
     )
     s = np.empty(math.prod(shape))
-    for first in range(0, len(s), _PAIRS):
-        part = np.arange(first, min(first + _PAIRS, len(s)))
+    for first in range(0, len(s), CACHE):
+        part = np.arange(first, min(first + CACHE, len(s)))
         at = np.unravel_index(part, shape or (1,))
         s[part] = class_sum(classes).value(_coordinates(channels[at], precoders[at], noise))
     rate: Real = classes.bits - np.logaddexp(0.0, s) / np.log(2.0)
@@ -142,13 +136,13 @@ class ClassSum:
     def least(self, z: Real) -> Real:
         """Return the smallest exponent of the nearest differences, (b,), at z (b, N²)."""
         phi = self._phi[:_NEAREST].T
-        step = max(1, _BLOCK // phi.shape[1])
+        step = max(1, CACHE // phi.shape[1])
         parts = [(z[i : i + step] @ phi).min(axis=1) for i in range(0, len(z), step)]
         return np.concatenate(parts)
 
     def sums(self, z: Real, columns: int) -> Real:
         """Return the first `columns` of Σ_k weight_k e^-D_k [1, φ], (b, columns), at z (b, N²)."""
-        step = max(1, _BLOCK // self._exponents)
+        step = max(1, CACHE // self._exponents)
         parts = [self._block(z[i : i + step], columns) for i in range(0, max(1, len(z)), step)]
         return np.concatenate(parts)
 

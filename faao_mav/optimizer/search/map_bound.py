@@ -48,9 +48,6 @@ _NEARER = 0.25
 """Sides of a cell to which the way that a table's rates are rounded outwards is rounded up.
 Chosen."""
 
-_GOLDEN, _SECTIONS = (5**0.5 - 1) / 2, 9
-"""Golden section of the price, and how often: it is found to 0.01. Chosen."""
-
 
 def at_ends(problem: Problem, rates: BestRates, price: float) -> float:
     """Return what the first and the last slot are worth at a `price`, bits."""
@@ -68,18 +65,13 @@ def at_ends(problem: Problem, rates: BestRates, price: float) -> float:
 
 
 def best_price(bound: Callable[[list[float]], float]) -> float:
-    """Return the price of the lowest `bound`, which is convex in it, by golden section."""
-    low, high = 0.0, 1.0
-    inner = [1 - _GOLDEN, _GOLDEN]
-    values = [bound([price]) for price in inner]
-    for _ in range(_SECTIONS):
-        left = int(values[0] <= values[1])  # which of both stays inside
-        low, high = (low, inner[1]) if left else (inner[0], high)
-        kept, worth = inner[1 - left], values[1 - left]
-        price = low + high - kept
-        pairs = sorted([(kept, worth), (price, bound([price]))])
-        inner, values = [each for each, _ in pairs], [each for _, each in pairs]
-    return inner[int(values[1] < values[0])]
+    """Return the price of the lowest `bound`, which is convex in it, to 0.01."""
+    from scipy.optimize import minimize_scalar
+
+    found = minimize_scalar(
+        lambda price: bound([price]), bounds=(0.0, 1.0), method="bounded", options={"xatol": 0.01}
+    )
+    return float(found.x)
 
 
 @dataclass(frozen=True)
