@@ -11,7 +11,9 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.fence_geometry import FenceGeometry
+from faao_mav.optimizer.interior.constraint import Grid, unknowns
 from faao_mav.optimizer.interior.limits import EnergyLimit
+from faao_mav.optimizer.interior.maximize import constraints_of
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.rates.field import rate_field
@@ -117,6 +119,20 @@ def _apart(
     return limits
 
 
+def _never_slow(kin: Kinematics, flight: Trajectory, moved: FlightVariables) -> list[Any]:
+    """Return the limits of an aircraft that cannot hover, linear in its move from `flight`."""
+    x, grid, limits = unknowns(kin, flight), Grid.of(kin), list[Any]()
+    by_slot = cp.hstack([moved.w, moved.v, moved.a]).T - x
+    for limit in constraints_of(kin) if kin.min_speed > 0 else ():
+        rows = limit.rows(x[list(limit.of)])
+        for value, slope, on in zip(
+            rows.value, rows.slope, limit.on(grid, len(rows.value)), strict=True
+        ):
+            change = sum(cp.multiply(slope[k], by_slot[i]) for k, i in enumerate(limit.of))
+            limits.append((value + change)[np.flatnonzero(on)] >= 0)
+    return limits
+
+
 def kkt_residual(
     kin: Kinematics,
     stage: Stage,
@@ -151,14 +167,14 @@ def kkt_residual(
     unit = float(np.abs(values.gradient).max())
     if unit == 0:
         return 0.0
-    flight = flight_variables(kin, about=trajectory.v)
+    flight = flight_variables(kin)
     shift = (flight.w - trajectory.w / LENGTH) * (LENGTH / reach)
     moved = [
         cp.sum(cp.multiply(gradient.T / unit, shift), axis=1)
         for gradient in np.moveaxis(values.gradient, 1, 0)
     ]
     gain = cp.Variable()
-    limits = [*flight.constraints, cp.abs(shift) <= 1]
+    limits = [*flight.constraints, *_never_slow(kin, trajectory, flight), cp.abs(shift) <= 1]
     if relay is None:
         above = (total - total.min()) / (unit * reach)
         limits += [gain <= a + cp.sum(m) / slots for a, m in zip(above, moved, strict=True)]

@@ -11,6 +11,7 @@ Measured (benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from t
 starts, and several times quicker.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -30,7 +31,7 @@ from faao_mav.optimizer.problem import Problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
-from faao_mav.optimizer.search.starts import EQUAL, improve_starts, paced, sparing_starts, starts
+from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, sparing_starts, starts
 from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.rate_steps import RateSteps
@@ -42,6 +43,10 @@ buffer need up to 300 steps."""
 _WIDTHS = (1.5, 0.5)
 """Decibels over which steps of a radio's own rates rise in the last searches. Chosen: of a step
 that is flown at, half of the last keeps the aircraft on it, 3 % of the distance."""
+
+_EQUAL = 1e-6
+"""The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
+is then up to rounding, and differs from machine to machine. Chosen."""
 
 _FOLLOWED = 2
 """Starts over a map that are improved: the best as they are. Chosen."""
@@ -74,23 +79,23 @@ def direct(
     routes = search.routes(before, known, alone=alone)
     tell(1, "the starts", 0.0)
     begun = {name: search.value(flight) for name, flight in routes.items()}
-    improved, reached, going = routes, begun, list(routes)
+    flights, reached, several = dict(routes), dict(begun), len(routes) > 1
+    if several and not problem.mapped:
+        improved = improve_starts(problem, search.field, routes, search.most_steps)
+        values = {name: search.value(flight) for name, flight in improved.items()}
+        better = [name for name in routes if values[name] > begun[name]]
+        flights |= {name: improved[name] for name in better}
+        reached |= {name: values[name] for name in better}
+    likely = dict.fromkeys(search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
+    going = list(likely)
     if problem.mapped:
-        going = sorted(begun, key=begun.__getitem__, reverse=True)[:_FOLLOWED]
-    elif len(routes) > 1:  # a single start needs no comparison
-        improved, going = improve_starts(problem, search.field, routes, search.most_steps)
-        reached = {name: search.value(flight) for name, flight in improved.items()}
-    first, then = (max(each, key=each.__getitem__) for each in (begun, reached))
-    starts, best_yet = [improved[name] for name in going], improved[then]
-    if begun[first] > reached[then]:  # no start was improved as far
-        best_yet = routes[first]
-        starts.append(best_yet)
-    tell(2, "the best start", max(begun[first], reached[then]))
-    optima = [search.followed(start, warm=len(routes) > 1) for start in starts]
-    ends = {name: search.value(end.trajectory) for name, end in zip(going, optima, strict=False)}
-    best = search.best(optima)
+        going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]
+    tell(2, "the best start", reached[going[0]])
+    optima = {name: search.followed(flights[name], warm=several) for name in going}
+    ends = {name: optimum.trajectory for name, optimum in optima.items()}
+    best = optima[search.best({name: each.value for name, each in optima.items()}, ends)]
     if isinstance(own_steps, RateSteps):
-        best = search.sharpened([*optima, replace(best, trajectory=best_yet)])
+        best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
     if spread_known(problem):
         best = search.under_shadowing(best)
     flight = best.trajectory
@@ -107,10 +112,11 @@ def direct(
     found = solution.maximised
     # values by tables may be above those of the precoders, and without shadowing more is delivered
     history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
+    reached |= {name: search.value(flight) for name, flight in ends.items()}
     return replace(
         solution,
         history=np.append(np.minimum(history, found), found),
-        starts={name: min(each, found) for name, each in (reached | ends).items()},
+        starts={name: min(each, found) for name, each in reached.items()},
         gain=None
         if before is None
         else found - problem.value(problem.rates(before.w, [before.P_B, before.P_U])),
@@ -186,18 +192,23 @@ class _Search:
         tolerance = self.problem.plan.optimizer.tolerance
         return self.problem.improved(self.field, start, tolerance, self.most_steps, warm=warm)
 
-    def best(self, optima: list[LocalOptimum]) -> LocalOptimum:
-        """Return the best of `optima`; of equal ones that which delivers most, then the first.
+    def best(
+        self,
+        values: Mapping[str, float],
+        flights: Mapping[str, Trajectory],
+        within: float = _EQUAL,
+    ) -> str:
+        """Return which of the `flights` with values `within` the best one's delivers most.
 
         A route and its mirror image have the same R_avg, and may deliver very different amounts.
         """
-        most = max(optimum.value for optimum in optima)
+        most = max(values.values())
 
-        def delivered(optimum: LocalOptimum) -> float:
-            rates = self.field.value(optimum.trajectory.w.T)
-            return round(objective(rates, self.problem.kinematics, self.problem.relay) / EQUAL)
+        def delivered(name: str) -> float:
+            rates = self.field.value(flights[name].w.T)
+            return round(objective(rates, self.problem.kinematics, self.problem.relay) / _EQUAL)
 
-        return max((each for each in optima if each.value > most - EQUAL), key=delivered)
+        return max((name for name in values if values[name] > most - within), key=delivered)
 
     def sharpened(self, optima: list[LocalOptimum]) -> LocalOptimum:
         """Return the best by the steps themselves of `optima` and of those for sharper steps."""

@@ -205,4 +205,4 @@ def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: Make
 
 def test_algorithm_1_is_for_aircraft_that_can_hover(paper_plan: MakePlan) -> None:
     with pytest.raises(PlanError, match=r"vehicle\.min_speed is not for algorithm1"):
-        optimize(paper_plan({"vehicle.min_speed": 9}))
+        optimize(paper_plan(TURNING | {"vehicle.min_speed": 9}))

@@ -12,7 +12,7 @@ from test_interior import copter, worst
 
 from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.maximize import LocalOptimum
+from faao_mav.optimizer.direct import _Search
 from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.optimizer.optimize import optimize
@@ -98,26 +98,19 @@ def test_what_is_rejected_would_not_have_won() -> None:
     assert solution.rates.R_avg == pytest.approx(max(alone), abs=plan.optimizer.tolerance)
     problem = build_problem(plan)
     routes = starts(problem.kinematics, NAMES, STATIONS)
-    improved, promising = improve_starts(problem, rate_field(problem, design(plan)), routes, 50)
-    assert 0 < len(promising) < len(NAMES)
+    improved = improve_starts(problem, rate_field(problem, design(plan)), routes, 50)
     assert all(value <= solution.rates.R_avg for value in solution.starts.values())
     for flight in improved.values():
         assert max(problem.kinematics.residuals(flight).values()) < 1e-7
 
 
-def test_of_equal_starts_the_first_is_promising_whatever_rounding_says(
-    small_plan: MakePlan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_equal_flights_the_first_is_best_whatever_rounding_says(small_plan: MakePlan) -> None:
     problem = build_problem(small_plan())
+    scheme = design(problem.plan)
     (flight,) = starts(problem.kinematics, ["straight"], {}).values()
-    values = iter((0.5, 0.5 + 1e-15))
-
-    def end(*_: object, **__: object) -> LocalOptimum:
-        return LocalOptimum(flight, next(values), 1, 0.0, True)
-
-    monkeypatch.setattr("faao_mav.optimizer.interior.maximize.maximize", end)
-    flights, field = {"bs": flight, "user": flight}, rate_field(problem, design(problem.plan))
-    assert improve_starts(problem, field, flights, 1)[1] == ["bs"]
+    search = _Search(problem, scheme, rate_field(problem, scheme))
+    values = {"bs": 0.5, "user": 0.5 + 1e-15}
+    assert search.best(values, dict.fromkeys(values, flight)) == "bs"
 
 
 def make(**changes: Any) -> Kinematics:

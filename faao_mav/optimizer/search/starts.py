@@ -2,8 +2,8 @@
 
 A start is a way, corner by corner, that is flown with a stop at each corner, or else by the flight
 nearest to it. Inside a fence ways are the shortest ones. An aircraft that cannot hover circles at
-the stations, and one that has to save energy on its way. All starts are improved roughly, side by
-side, which tells those to improve to the end; long flights on a coarse copy with fewer slots.
+the stations, and one that has to save energy on its way. All starts are improved roughly, which
+tells the one to improve to the end; long flights on a coarse copy with fewer slots.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -47,16 +47,8 @@ COARSE_SLOTS = 60
 """Slots of the coarse copy of flights of at least twice as many: enough for the shape of a route.
 Chosen."""
 
-_ROUGH, _COARSE_ERROR = 3e-3, 5e-3
-"""The tolerance on R_avg, bit/s/Hz, to which starts are improved before they are compared, and the
-share of the best value within which they are equally good on the coarse copy. Chosen."""
-
-_SAME = 0.02
-"""The distance of flights that count as one, in the longer of their extents in x and y. Chosen."""
-
-EQUAL = 1e-6
-"""The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
-is then up to rounding, and differs from machine to machine. Chosen."""
+ROUGH = 3e-3
+"""The tolerance, bit/s/Hz, to which starts are improved before they are compared. Chosen."""
 
 
 def starts(
@@ -234,12 +226,11 @@ def block_stage(stage: Stage, fine: int, slots: int) -> Stage:
 
 def improve_starts(
     problem: Problem, stage: Stage, flights: Mapping[str, Trajectory], max_iterations: int
-) -> tuple[dict[str, Trajectory], list[str]]:
-    """Return the feasible `flights` improved roughly by `stage`, and the names of promising ones.
+) -> dict[str, Trajectory]:
+    """Return the feasible `flights` improved roughly by `stage`.
 
-    Not promising are flights that end clearly below the best, and those that end where an earlier
-    one does. No coarse copy is used for short flights, for those with a least speed or an energy
-    (the copy cannot make their circles).
+    Long flights are improved on a coarse copy, but for those with a least speed or an energy: it
+    cannot make their circles.
     """
     kin = copy = problem.kinematics
     reward = stage
@@ -254,26 +245,14 @@ def improve_starts(
             bound_first_acceleration=True,
         )
         reward = block_stage(stage, kin.slots, COARSE_SLOTS)
-    optima = {}
+    improved, limits = {}, problem.constraints(kin)
     for name, flight in flights.items():
         start = flight if copy is kin else copy.follow(paced(copy, flight, kin.time_step))
-        optima[name] = problem.improved(reward, start, _ROUGH, max_iterations, kin=copy)
-    best = max(optimum.value for optimum in optima.values())
-    least = best - max(EQUAL, 0.0 if copy is kin else _COARSE_ERROR * best)
-    promising: list[str] = []
-    for name, optimum in optima.items():  # of flights that count as one the first
-        w = optimum.trajectory.w
-        near = _SAME * float(np.ptp(w, axis=0).max())
-        others = (optima[other].trajectory.w for other in promising)
-        if optimum.value >= least and all(np.abs(w - other).max() > near for other in others):
-            promising.append(name)
-    improved = {name: optimum.trajectory for name, optimum in optima.items()}
-    if copy is not kin:
-        limits = problem.constraints(kin)
-        for name, end in improved.items():
-            velocities = paced(kin, end, copy.time_step)
-            improved[name] = feasible(kin, flights[name], velocities, limits)
-    return improved, promising
+        end = problem.improved(reward, start, ROUGH, max_iterations, kin=copy).trajectory
+        if copy is not kin:
+            end = feasible(kin, flight, paced(kin, end, copy.time_step), limits)
+        improved[name] = end
+    return improved
 
 
 def paced(kin: Kinematics, flight: Trajectory, time_step: float) -> Real:
