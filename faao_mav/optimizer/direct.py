@@ -236,19 +236,9 @@ class _Search:
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
-    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows.
-
-    With known draws they are searched afresh too, and the better kept.
-    """
+    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows."""
     H = link.channel(w)
     near = rate.initial_precoders(*link_coordinates(link, w.T)) if scheme.optimal else None
-    if near is None:
-        return scheme.precoders(link, H)
-    if link.measure != "cutoff":
+    if near is not None and link.measure != "cutoff":
         return near
-    carried = scheme.precoders(link, H, start=near)
-    if scheme.averaged or link.nlos is None:
-        return carried
-    afresh = scheme.precoders(link, H)
-    better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
-    return np.asarray(np.where(better[:, None, None], carried, afresh))
+    return scheme.precoders(link, H, start=near)
