@@ -16,7 +16,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.best_rates import BestRates
-from faao_mav.optimizer.search.map_bound import at_ends, best_price
+from faao_mav.optimizer.search.map_bound import PARTS, at_ends, best_price
 from faao_mav.optimizer.search.sweep import largest_within
 
 _BEYOND = 40.0
@@ -25,9 +25,6 @@ _BEYOND = 40.0
 _INTERVAL, _MOST_INSTANTS, _MOST_CELLS = 2.4, 50, 100_000
 """Time between instants, s, at least; instants of a flight, and cells at one, at most: where a_max
 is small the instants lie farther apart. Chosen."""
-
-_PARTS = 4
-"""Places to the side of a cell at which rates are tabulated. Chosen."""
 
 _APART = (-0.05, -0.01, 0.01, 0.05)
 """Prices of the bound beside that of the lowest bound in coarse cells. Several part the flights by
@@ -175,14 +172,14 @@ class AxisBound:
         kin, (instants, _, blocks) = self.problem.kinematics, self.times
         speed, rows = self.gap * self.columns, len(self.x)
         found = np.zeros((2, len(across), 1, len(speed), rows))
-        part = self.side / _PARTS
+        part = self.side / PARTS
         for slot in blocks[k].tolist():
             tau = slot * kin.time_step - float(instants[k])
             off = (self.side + part + self.gap * abs(tau) + kin.max_acceleration * tau**2) / 2
             shifts = np.rint(speed * tau / part).astype(np.intp)
             most = int(np.abs(shifts).max())
-            table = self.x[0] + part * np.arange(-most, _PARTS * (rows - 1) + most + 1)
-            inner = most + shifts[:, None] + _PARTS * np.arange(rows)
+            table = self.x[0] + part * np.arange(-most, PARTS * (rows - 1) + most + 1)
+            inner = most + shifts[:, None] + PARTS * np.arange(rows)
             for link, hop in enumerate(self.problem.links):
                 away = self.places[0][2 + link] - table
                 # beyond the first row, any place; beyond the last, any too

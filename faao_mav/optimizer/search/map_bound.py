@@ -41,7 +41,7 @@ _APART = np.array([0.02, 0.06, 0.11, 0.18, 0.27, 0.36, 0.47])
 """Prices of the bound to both sides of the one that alone bounds best. Measured on the same site:
 2.5 % tighter than five that end at 0.4."""
 
-_PARTS = 2
+PARTS = 2
 """Points to the side of a cell at which rates are tabulated. Chosen."""
 
 _NEARER = 0.25
@@ -131,7 +131,7 @@ class MapBound:
         slots = cells.blocks[k]
         tau = slots * kin.time_step - float(cells.instants[k])
         velocities, gap = self._velocities(slots)
-        parts = 1 if len(velocities) == 1 else _PARTS
+        parts = 1 if len(velocities) == 1 else PARTS
         side = cells.side / parts
         shifts = np.rint(tau[:, None, None] * velocities / side).astype(np.intp)
         margin = int(np.abs(shifts).max())
