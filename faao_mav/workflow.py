@@ -155,8 +155,17 @@ class Result:
         A part that is not there is null.
         """
         solution, plan, conversion = self.solution, self.solution.plan, self.conversion
-        information, fresh, flown = self.information, self.fresh, self.prediction
-        under = self.shadowed
+        information, fresh, under = self.information, self.fresh, self.shadowed
+        flown, energy = self.prediction, self.check and self.check.energy
+        mission = predicted = None
+        if conversion is not None and flown is not None:
+            mission = {
+                "items": len(conversion.mission.items),
+                "duration": flown.duration,
+                "distance": conversion.schedule.route.distance,
+                "parameters": dict(conversion.parameters),
+            }
+            predicted = flight_as_dict(plan, flown) | {"assumption": conversion.vehicle.assumption}
         return {
             "name": plan.name,
             **rates_as_dict(plan, solution.rates, solution.delivered_rate),
@@ -178,9 +187,7 @@ class Result:
             "upper_bound_exact": self.bound.exact if self.bound else None,
             "goal": _goal_as_dict(solution),
             "height": _height_as_dict(solution),
-            "shadowing": {"mean": under.mean, "quantiles": dict(under.quantiles)}
-            if under
-            else None,
+            "shadowing": under and {"mean": under.mean, "quantiles": dict(under.quantiles)},
             "starts": dict(solution.starts),
             "iterations": solution.iterations,
             "converged": solution.converged,
@@ -191,22 +198,10 @@ class Result:
             "saturated": self.saturation.saturated if self.saturation else None,
             "spare_db": self.saturation.spare_db if self.saturation else None,
             "no_mission": str(self.no_mission) if self.no_mission else None,
-            "mission": {
-                "items": len(conversion.mission.items),
-                "duration": flown.duration,
-                "distance": conversion.schedule.route.distance,
-                "parameters": dict(conversion.parameters),
-            }
-            if conversion and flown
-            else None,
-            "predicted": {
-                **flight_as_dict(plan, flown),
-                "assumption": conversion.vehicle.assumption,
-            }
-            if conversion and flown
-            else None,
+            "mission": mission,
+            "predicted": predicted,
             "wind": asdict(plan.site.wind),
-            "energy": self.check.energy.as_dict() if self.check and self.check.energy else None,
+            "energy": energy and energy.as_dict(),
             "fence": self.fence,
             "validation": [asdict(finding) for finding in self.findings],
         }
@@ -227,12 +222,11 @@ def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
         "power_dbm": [round(dbm(power), 6) for power in plan.powers],
         "energy_wh": solution.energy_wh,
         "limit": least.limit,
-        "one_step_less": {
+        "one_step_less": below
+        and {
             "delivered_rate": below.delivered_rate,
             "delivered_mbytes": below.plan.megabytes(below.delivered_rate),
-        }
-        if below is not None
-        else None,
+        },
         "optimizations": least.optimizations,
     }
 

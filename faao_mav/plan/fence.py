@@ -9,8 +9,7 @@ import numpy as np
 from faao_mav.errors import InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
-from faao_mav.mission.fence_area import FreeArea
-from faao_mav.plan.fields import MAX_LOCAL_DISTANCE
+from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Problem, wrong
 from faao_mav.plan.model import PlanContents, PlanFile
 from faao_mav.plan.sections import CircleZone, FenceOptions, PolygonZone
 from faao_mav.vector import Vector
@@ -93,50 +92,36 @@ def _degrees(frame: LocalFrame, places: Sequence[Vector]) -> tuple[LatLon, ...]:
     return tuple(zip(latitude.tolist(), longitude.tolist(), strict=True))
 
 
-def fence_problems(plan: PlanContents) -> Iterator[str]:
+def fence_problems(plan: PlanContents) -> Iterator[Problem]:
     """Yield why no flight of `plan` can keep its margin from the edge of fence, ground and maps."""
     area = plan.keep_in
     if area is None:
         return
     for part in plan.zones:
         if part.crosses_itself:
-            yield f"fence: {part.name} crosses or touches itself; put its corners in order"
-    margin, what = plan.margin, margin_key(plan)
+            yield wrong("fence-crosses", part=part.name)
     if area.empty:
-        yield "fence: leaves no place; the inclusions do not overlap, or exclusions cover them"
-    kept = area.inside(margin)
+        yield wrong("fence-empty")
+    kept = area.inside(plan.margin)
     if kept.empty:
-        yield f"{what}: {margin:g} m: no place is that far from the edge; give less"
-    if plan.geofence and plan.optimizer.method == "algorithm1":
-        yield "fence: algorithm1 (optimizer.method) plans without one; give method direct"
+        yield wrong("fence-margin", key=margin_key(plan))
     ends = {"start": plan.flight.start, "end": plan.flight.end}
     for name, place in ends.items():
         if not kept.covers(np.array([place])).all() and all(
             known.above_law or known.covers(place) for known in plan.maps
         ):
-            yield f"flight.{name}: {list(place)} is {trouble(plan, place)}"
-    yield from _way_problems(plan, kept)
-
-
-def _way_problems(plan: PlanContents, kept: FreeArea) -> Iterator[str]:
-    flight, margin = plan.flight, plan.margin
-    ends = np.array([flight.start, flight.end])
+            yield wrong("fence-end", end=name, place=list(place), trouble=trouble(plan, place))
+    flight, edge, straight = plan.flight, edge_of(plan), np.array([*ends.values()])
     # among the many corners of ground the shortest way takes long
-    way = ends if plan.ground else kept.shortest_way(*ends)
-    if way is None or not kept.connected(ends):
-        yield (
-            f"{edge_of(plan)}: no way leads from flight.start {list(flight.start)} to flight.end "
-            f"{list(flight.end)} that keeps {margin:g} m ({margin_key(plan)}) from the edge"
-        )
+    way = straight if plan.ground else kept.shortest_way(*straight)
+    if way is None or not kept.connected(straight):
+        asked = {name: list(place) for name, place in ends.items()}
+        yield wrong("fence-way", edge=edge, key=margin_key(plan), **asked)
         return
     length = float(np.hypot(*np.diff(way, axis=0).T).sum())
     most = plan.max_ground_speed * (flight.duration - flight.time_step)
     if length > most * (1 + _SHORTER_WAY):
-        yield (
-            f"flight.duration: {flight.duration:g} s is too short: the shortest way from start to "
-            f"end inside the {edge_of(plan)} is {length:.0f} m, and {plan.max_ground_speed:g} m/s "
-            f"takes the aircraft {most:.0f} m"
-        )
+        yield wrong("fence-long", edge=edge, length=length, most=most)
 
 
 def trouble(plan: PlanContents, place: Vector) -> str:

@@ -24,6 +24,8 @@ from pydantic import (
     Field,
     PlainValidator,
     Strict,
+    TypeAdapter,
+    ValidationError,
     ValidationInfo,
     with_config,
 )
@@ -140,26 +142,15 @@ def told(reason: str) -> PydanticCustomError:
     return PydanticCustomError("told", "{reason}", {"reason": reason})
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+_PAIR: TypeAdapter[Vector] = TypeAdapter(tuple[Number, Number])
 
 
-def _to_float(value: float) -> float:
+def read_pair(value: object, expected: str) -> Vector:
+    """Return two finite numbers; raise ValueError that says what is `expected` for others."""
     try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
-def read_pair(value: object, unit: str) -> Vector:
-    """Check `[east, north]`."""
-    if not (isinstance(value, list) and len(value) == 2 and all(map(_is_number, value))):
-        raise ValueError(f"not two numbers [east, north] in {unit}")
-    east, north = map(_to_float, value)
-    for component in (east, north):
-        if not math.isfinite(component):
-            raise ValueError(f"{component} is not a finite number of {unit}")
-    return east, north
+        return _PAIR.validate_python(value)
+    except ValidationError:
+        raise ValueError(f"not two finite numbers {expected}") from None
 
 
 def check_degrees(latitude: float, longitude: float) -> None:
@@ -177,7 +168,7 @@ def read_position(value: object, info: ValidationInfo) -> Vector:
     if isinstance(value, dict):
         context: Any = info.context
         return _local(value, context.get("origin"))
-    east, north = read_pair(value, "metres")
+    east, north = read_pair(value, "[east, north] in metres")
     if max(abs(east), abs(north)) > MAX_LOCAL_DISTANCE:
         raise ValueError(f"farther than {MAX_LOCAL_DISTANCE / 1000:.0f} km from the origin")
     return east, north
@@ -185,9 +176,8 @@ def read_position(value: object, info: ValidationInfo) -> Vector:
 
 def _local(value: Mapping[str, Any], origin: Vector | None) -> Vector:
     """Return the metres about `origin` of {latitude, longitude}; zeros for a bad origin."""
-    if set(value) != {"latitude", "longitude"} or not all(map(_is_number, value.values())):
-        raise ValueError("not {latitude: degrees, longitude: degrees}")
-    place = (_to_float(value["latitude"]), _to_float(value["longitude"]))
+    both = [value.get("latitude"), value.get("longitude")] if len(value) == 2 else None
+    place = read_pair(both, "{latitude: degrees, longitude: degrees}")
     check_degrees(*place)
     if origin is None:
         return 0.0, 0.0
@@ -221,15 +211,22 @@ def _slip(place: Vector, origin: Vector) -> str:
 def _velocity(value: object) -> Vector | None:
     if value in ("hover", "free"):
         return (0.0, 0.0) if value == "hover" else None
-    if isinstance(value, str):
-        raise ValueError("not hover, free or a velocity")
-    return read_pair(value, "m/s")
+    return read_pair(value, "[east, north] in m/s")
 
 
 def _velocity_word(velocity: Vector | None) -> object:
     if velocity is None:
         return "free"
     return velocity if any(velocity) else "hover"
+
+
+Problem: TypeAlias = tuple[str, dict[str, Any]]
+"""What keys that do not agree have wrong: a row of `problems.tsv`, and the values said there."""
+
+
+def wrong(row: str, **values: Any) -> Problem:
+    """Return that the problem of a `row` is there, with `values` for its text."""
+    return row, values
 
 
 PLACE = "[east, north] in metres or {latitude: degrees, longitude: degrees}"

@@ -138,23 +138,36 @@ def varied_twice(keys: Iterable[str]) -> str:
     return ""
 
 
-def unknown_key(key: str) -> str:
-    """Return why `key` cannot be varied and what is near it; nothing for a key that can.
+def unknown(above: str, name: str, *, dotted: bool = False) -> str:
+    """Return that the section `above` has no key `name`, and the known keys near it.
 
-    >>> unknown_key("radio.relay.power_dbm")
-    ''
-    >>> unknown_key("radio.modulaton")
-    'unknown key; did you mean radio.modulation?'
+    Those of the section are named alone, or as a study has them, `dotted`.
+
+    >>> unknown("radio", "modulaton")
+    'unknown key; did you mean modulation?'
     """
-    every = [k for k in reference().values() if k.path.split(".")[0] not in _NOT_VARIED]
-    known = [*ALIASES, *(k.path for k in every if not k.inside)]
-    if key in known or (key.startswith(_FREE) and key != _FREE):
+    known = [*(ALIASES if dotted else ()), *reference()]
+    beside = {each.rpartition(".")[2]: each for each in known if each.rpartition(".")[0] == above}
+    close = difflib.get_close_matches(name, beside, n=1)
+    close = [beside[each] for each in close] if dotted else close
+    close = close or [each for each in known if each.rpartition(".")[2] == name]
+    if close:
+        return f"unknown key; did you mean {' or '.join(close)}?"
+    return f"unknown key; known here: {', '.join(sorted(beside))}"
+
+
+def not_varied(key: str) -> str:
+    """Return why a study cannot vary `key`, and what is near it; nothing for a key that it can.
+
+    >>> not_varied("radio.relay.power_dbm"), not_varied("radio.duplx")
+    ('', 'unknown key; did you mean radio.duplex?')
+    """
+    known = reference()
+    if key in ALIASES or key.removeprefix(_FREE) not in ("", key):
         return ""
-    if any(k.path == key for k in every):
-        inside = [path for path in known if path.startswith(f"{key}.")]
-        return f"a section cannot be varied; give one of {', '.join(inside)}"
-    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
-    same = [path for path in known if path.rsplit(".", 1)[-1] == key.rsplit(".", 1)[-1]]
-    if same or close:
-        return f"unknown key; did you mean {' or '.join(same or close)}?"
-    return "unknown key; give a dotted key of the plan, as radio.modulation"
+    if key.partition(".")[0] in _NOT_VARIED:
+        return "unknown key of a study; give another key of the plan, as radio.modulation"
+    if key not in known:
+        return unknown(*key.rpartition(".")[::2], dotted=True)
+    inside = [path for path in known if path.startswith(f"{key}.") and not known[path].inside]
+    return f"a section cannot be varied; give one of {', '.join(inside)}" if inside else ""

@@ -143,6 +143,10 @@ class GroundUser(Station):
     gain: GainLaw | None = key("Own path gain of this hop.", accepted=_GAIN_FILE, default=None)
 
 
+STATIONS = ("base_station", "ground_user")
+"""The keys of the stations, in the order of `Radio.stations`."""
+
+
 @section
 class Radio:
     """Both links."""

@@ -1,10 +1,8 @@
 """`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
-import difflib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import InitVar, dataclass, fields
 from functools import cache, lru_cache
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,7 @@ from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.files import read_columns, read_text
 from faao_mav.plan.checks import problems
 from faao_mav.plan.fence import geofence, written_out
-from faao_mav.plan.keys import PlanKey, reference
+from faao_mav.plan.keys import reference, unknown
 from faao_mav.plan.model import PlanContents, PlanFile
 from faao_mav.plan.sections import CHOICES
 from faao_mav.plan.station import read_track
@@ -29,8 +27,8 @@ _MAX_LINES = 6
 """Lines of a message; chosen to fit a small terminal."""
 
 
-MAX_BESIDE = 1_000_000
-"""Characters of the longest file that a plan names; chosen: a law of the gain has 500."""
+MAX_BESIDE = 300_000
+"""Characters of the longest file that a plan names: two of them fit into the plan's text."""
 
 _RATES = (("snr_db", "mbit_per_s"), ("snr_db", "bit_per_s_per_hz"))
 """The columns of a table of rates."""
@@ -188,7 +186,7 @@ def filled_in(data: dict[str, Any], source: str) -> dict[tuple[str, ...], str]:
         path = Path(law or source).parent / name
         try:
             if read is None:
-                section[key] = _word(path, _version(path))
+                section[key] = _word(path, path.is_file() and path.stat().st_mtime_ns)
             else:
                 section[key] = read(read_text(path, MAX_BESIDE, "text", PlanError), str(path))
         except InputError as error:
@@ -198,18 +196,10 @@ def filled_in(data: dict[str, Any], source: str) -> dict[tuple[str, ...], str]:
     return files
 
 
-def _version(path: Path) -> tuple[int, int] | None:
-    try:
-        told = path.stat()
-    except (OSError, ValueError):
-        return None
-    return told.st_mtime_ns, told.st_size
-
-
 @lru_cache(maxsize=8)
-def _word(path: Path, version: tuple[int, int] | None) -> str:
+def _word(path: Path, changed: int) -> str:
     """Return the word of a map's file: the page reads its plan anew at every change of it."""
-    del version
+    del changed
     return map_word(read_map(path))
 
 
@@ -267,53 +257,31 @@ def _describe(error: ValidationError, source: str, files: Mapping[tuple[str, ...
     inside = {d["loc"][:k] for d in details for k in range(len(d["loc"]))}
     # of a list whose items are wrong pydantic also says that it is too short
     own = [d for d in details if d["type"] != "too_short" or d["loc"] not in inside]
-    lines = list(dict.fromkeys(islice(_lines(own, files), _MAX_LINES)))
+    lines = list(dict.fromkeys(_line(detail, files) for detail in own[:_MAX_LINES]))
     if len(own) > _MAX_LINES:
         lines.append(f"and {len(own) - _MAX_LINES} more")
     return "\n".join(f"{source}: {line}" for line in lines)
 
 
-def _lines(details: Sequence[ErrorDetails], files: Mapping[tuple[str, ...], str]) -> Iterator[str]:
-    known = reference()
-    for detail in details:
-        value, kind, loc = detail["input"], detail["type"], detail["loc"]
-        own = loc[-1:] if kind == "unexpected_keyword_argument" else ()  # may be any text
-        steps = [step for step in loc[: len(loc) - len(own)] if step not in CHOICES] + [*own]
-        keys = [step for step in steps if isinstance(step, str)]
-        accepted = _accepted(known, *keys)
-        if kind == "missing":
-            problem = f"missing; give {accepted}"
-        elif kind == "unexpected_keyword_argument":
-            problem = f"unknown key; {_nearest(known, *keys)}"
-        elif kind == "told":
-            problem = detail["msg"]
-        elif kind == "value_error":
-            problem = f"{quote(value)}: {detail['ctx']['error']}; give {accepted}"
-        elif kind == "finite_number":
-            problem = f"{value} is not a finite number; give {accepted}"
-        else:
-            problem = f"{quote(value)} is not accepted; give {accepted}"
-        above = next((key for key in files if tuple(steps[: len(key)]) == key), ())
-        where = [place_of(above), files[above]] if above else []
-        where.append(place_of(steps[len(above) :]))
-        yield ": ".join([*filter(None, where), problem])
-
-
-def _accepted(known: Mapping[str, PlanKey], *keys: str) -> str:
-    """Return what the key at a path accepts, or the nearest known one above it."""
-    while keys and ".".join(keys) not in known:
-        keys = keys[:-1]
-    return known[".".join(keys)].accepted if keys else "a mapping"
-
-
-def _nearest(known: Mapping[str, PlanKey], *keys: str) -> str:
-    *above, name = keys
-    section = known.get(".".join(above))
-    here = sorted(section.inside if section else (path for path in known if "." not in path))
-    close = difflib.get_close_matches(name, here, n=1, cutoff=0.6)
-    if close:
-        return f"did you mean {close[0]}?"
-    elsewhere = [path for path in known if path.rsplit(".", 1)[-1] == name]
-    if elsewhere:
-        return f"it belongs at {' or '.join(elsewhere)}"
-    return f"known here: {', '.join(here)}"
+def _line(detail: ErrorDetails, files: Mapping[tuple[str, ...], str]) -> str:
+    known, value, kind, loc = reference(), detail["input"], detail["type"], detail["loc"]
+    own = loc[-1:] if kind == "unexpected_keyword_argument" else ()  # may be any text
+    steps = [step for step in loc[: len(loc) - len(own)] if step not in CHOICES] + [*own]
+    keys = [step for step in steps if isinstance(step, str)]
+    paths = (".".join(keys[:k]) for k in range(len(keys), 0, -1))
+    accepted = next((known[path].accepted for path in paths if path in known), "a mapping")
+    if kind == "missing":
+        problem = f"missing; give {accepted}"
+    elif kind == "unexpected_keyword_argument":
+        problem = unknown(".".join(keys[:-1]), keys[-1])
+    elif kind == "told":
+        problem = detail["msg"]
+    elif kind == "value_error":
+        problem = f"{quote(value)}: {detail['ctx']['error']}; give {accepted}"
+    elif kind == "finite_number":
+        problem = f"{value} is not a finite number; give {accepted}"
+    else:
+        problem = f"{quote(value)} is not accepted; give {accepted}"
+    above = next((key for key in files if tuple(steps[: len(key)]) == key), ())
+    where = [place_of(above), files[above]] if above else []
+    return ": ".join([*filter(None, [*where, place_of(steps[len(above) :])]), problem])

@@ -8,13 +8,9 @@ from pydantic import (
     AfterValidator,
     Discriminator,
     Field,
-    PlainValidator,
     Tag,
-    TypeAdapter,
-    ValidationError,
     ValidationInfo,
 )
-from pydantic_core import PydanticCustomError
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan.fields import (
@@ -95,29 +91,20 @@ class Site:
     wind: Wind = Wind(speed=0.0, from_degrees=0.0)
 
 
+_Height: TypeAlias = Annotated[Number, Field(ge=1, le=20000)]
+
+
 class Heights(NamedTuple):
     """Heights above the origin of which the best is to be found, from `least` to `most`, m."""
 
-    least: float
-    most: float
+    least: _Height
+    most: _Height
 
 
-_HEIGHT: TypeAdapter[float] = TypeAdapter(Annotated[Number, Field(ge=1, le=20000)])
-
-
-def _height(value: object) -> float | Heights:
-    """Check a height, or {least: height, most: height}."""
-    try:
-        if not isinstance(value, dict):
-            return _HEIGHT.validate_python(value)
-        if set(value) != {"least", "most"}:
-            raise ValueError("not {least: metres, most: metres}")
-        found = Heights(*(_HEIGHT.validate_python(value[end]) for end in ("least", "most")))
-    except ValidationError as error:
-        raise PydanticCustomError(str(error.errors()[0]["type"]), "not accepted") from None
-    if not found.least < found.most:
+def _rising(height: float | Heights) -> float | Heights:
+    if isinstance(height, Heights) and height.least >= height.most:
         raise ValueError("the least is not below the most")
-    return found
+    return height
 
 
 @section
@@ -129,7 +116,11 @@ class Flight:
 
     start: Position = key("Where the flight starts, w_I.", "m")
     end: Position = key("Where the flight ends, w_F.", "m")
-    height: Annotated[float | Heights, PlainValidator(_height)] = key(
+    height: Annotated[
+        Annotated[_Height, Tag("<height>")] | Annotated[Heights, Tag("<heights>")],
+        Discriminator(lambda value: "<heights>" if isinstance(value, dict) else "<height>"),
+        AfterValidator(_rising),
+    ] = key(
         "Height H above the origin, or those of which the best is to be found.",
         "m",
         "a height above the origin in metres, 1 (an aircraft that is lower has hardly left the "
@@ -236,7 +227,7 @@ class PolygonZone:
     polygon: tuple[Position, ...] = key("Corners.", "m", "three corners or more", min_length=3)
 
 
-CHOICES = ("<circle>", "<polygon>", "<corners>", "<zones>")
+CHOICES = ("<height>", "<heights>", "<circle>", "<polygon>", "<corners>", "<zones>")
 """What pydantic puts into the place of an error for the choice among several types."""
 
 

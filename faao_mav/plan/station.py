@@ -1,7 +1,6 @@
 """Where a station is: at a place, on a line at a velocity, or on a track with times."""
 
 import math
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import Annotated, NamedTuple, TypeAlias
 
@@ -41,59 +40,33 @@ class Track(NamedTuple):
 def read_track(text: str, path: str) -> str:
     """Return the track in the `text` of the file `path`, .csv or .gpx, as the plan has it.
 
-    That is a table with `time_s`, s after the first point, and its place in two more columns.
-    Raises `InputError` that names line or point for what is no track.
-    """
-    try:
-        if path.lower().endswith(".gpx"):
-            names, points = [*_GLOBAL], _gpx_points(text)
-        else:
-            lines, held = read_columns(text, (_LOCAL, _GLOBAL))
-            _check_times(lines, held["time_s"])
-            names, points = [*held], list(zip(*held.values(), strict=True))
-    except InputError as error:
-        raise PlanError(f"{path}: {error}") from None
-    first = points[0][0]
-    rows = (f"{t - first:.11g},{x:.11g},{y:.11g}" for t, x, y in points)
-    return "\n".join([",".join(names), *rows, ""])
-
-
-def _gpx_points(text: str) -> list[tuple[float, float, float]]:
-    """Return seconds, latitude and longitude of the points of all tracks in GPX.
+    That is a table with `time_s` and its place in two more columns; of a .gpx, seconds after the
+    first point of all tracks. Raises `PlanError` that names the point for what is no GPX.
 
     Source: GPX 1.1, trkpt and its time, ISO 8601.
     """
+    if not path.lower().endswith(".gpx"):
+        return text
     from faao_mav.mission.formats.fence_file import xml_tree  # plans rarely have one
 
     try:
         found = list(xml_tree(text.encode()).iter("trkpt"))
     except MissionFileError as error:
-        raise PlanError(str(error)) from None
-    points = []
+        raise PlanError(f"{path}: {error}") from None
+    rows, first = [",".join(_GLOBAL)], 0.0
     for number, point in enumerate(found, 1):
         when, lat, lon = point.findtext("time") or "", point.get("lat", ""), point.get("lon", "")
         try:
             moment = datetime.fromisoformat(when.strip())
-            moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
-            points.append((moment.timestamp(), float(lat), float(lon)))
+            t = (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+            first = t if number == 1 else first
+            rows.append(f"{t - first:.11g},{float(lat):.11g},{float(lon):.11g}")
         except (ValueError, OverflowError):
             raise PlanError(
-                f"point {number}: lat {quote(lat)}, lon {quote(lon)}, time {quote(when)}; give "
-                "degrees, and a time as 2026-05-01T12:00:00Z"
+                f"{path}: point {number}: lat {quote(lat)}, lon {quote(lon)}, time {quote(when)}; "
+                "give degrees, and a time as 2026-05-01T12:00:00Z"
             ) from None
-    _check_times(range(1, len(points) + 1), [t for t, _, _ in points], "point")
-    return points
-
-
-def _check_times(numbers: Sequence[int], times: list[float], each: str = "line") -> None:
-    """Raise `PlanError` unless there are two times or more, not too many, which rise."""
-    if not 2 <= len(times) <= MAX_POINTS:
-        raise PlanError(f"{len(times):,} points with a time; give 2 to {MAX_POINTS:,}")
-    before = -math.inf
-    for number, t in zip(numbers, times, strict=True):
-        if not (math.isfinite(t) and t > before):
-            raise PlanError(f"{each} {number}: time {t:g} s; give finite times that rise")
-        before = t
+    return "\n".join([*rows, ""])
 
 
 def _track(value: object, info: ValidationInfo) -> Track | None:
@@ -102,18 +75,22 @@ def _track(value: object, info: ValidationInfo) -> Track | None:
     if not isinstance(value, str):
         raise ValueError("no file")
     try:
-        lines, held = read_columns(value, (_LOCAL, _GLOBAL))
-        _check_times(lines, held["time_s"])
+        _, held = read_columns(value, (_LOCAL, _GLOBAL))
     except InputError as error:
         raise told(str(error)) from None
     times, *sides = held.values()
-    places = []
-    for number, place in enumerate(zip(*sides, strict=True), 1):
-        written = dict(zip(_GLOBAL[1:], place, strict=True)) if "latitude" in held else [*place]
+    if not 2 <= len(times) <= MAX_POINTS:
+        raise told(f"{len(times):,} points with a time; give 2 to {MAX_POINTS:,}")
+    before, places = -math.inf, []
+    for number, (t, *place) in enumerate(zip(times, *sides, strict=True), 1):
+        written = dict(zip(_GLOBAL[1:], place, strict=True)) if "latitude" in held else place
         try:
             places.append(read_position(written, info))
         except (ValueError, PydanticCustomError) as error:
             raise told(f"point {number}: {error}") from None
+        if not (math.isfinite(t) and t > before):
+            raise told(f"point {number}: time {t:g} s; give finite times that rise")
+        before = t
     return Track(tuple(t - times[0] for t in times), tuple(places))
 
 
@@ -136,7 +113,7 @@ _Place: TypeAlias = Annotated[Vector, PlainValidator(_place), Written(PLACE)]
 
 
 def _velocity(value: object) -> Vector:
-    velocity = read_pair(value, "m/s")
+    velocity = read_pair(value, "[east, north] in m/s")
     if math.hypot(*velocity) > _FASTEST:
         raise ValueError("faster than any vehicle")
     return velocity

@@ -12,10 +12,9 @@ from typing import Any, ClassVar
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer
-from ruamel.yaml.constructor import SafeConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.events import AliasEvent
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
+from ruamel.yaml.nodes import MappingNode, ScalarNode
 from ruamel.yaml.representer import SafeRepresenter
 from ruamel.yaml.resolver import VersionedResolver
 
@@ -56,6 +55,9 @@ _CORE_SCHEMA = {
 """The types of the words that are no text, with their patterns: without 0x, 0o and dates."""
 
 
+_TEXT = "tag:yaml.org,2002:str"
+
+
 class _Refused(MarkedYAMLError):
     """Sound YAML that is not used in plans."""
 
@@ -72,6 +74,8 @@ class _CoreResolver(VersionedResolver):
 
 
 class _PlainComposer(Composer):
+    """Refuses what plans have no use for, and puts long words into their places again."""
+
     _values = 0
 
     def compose_node(self, parent: Any, index: Any) -> Any:
@@ -90,25 +94,14 @@ class _PlainComposer(Composer):
             raise _Refused(problem=problem, problem_mark=event.start_mark)
         self.anchors.clear()  # one that is named twice is no matter where none is used
         node = super().compose_node(parent, index)
+        is_key = isinstance(parent, MappingNode) and index is None
         if isinstance(node, ScalarNode):
             node.value = _words_of(self.loader.long, node.value)
-        return node
-
-
-class _UniqueKeys(SafeConstructor):
-    def check_mapping_key(
-        self, node: MappingNode, key_node: Node, mapping: Any, key: Any, value: Any
-    ) -> bool:
-        del node, value
-        problem = ""
-        if not isinstance(key, str):
-            shown = f", not {key_node.value}" if isinstance(key_node.value, str) else ""
+        if is_key and node.tag != _TEXT:
+            shown = f", not {node.value}" if isinstance(node, ScalarNode) and node.value else ""
             problem = f"a key has to be a word{shown}"
-        elif key in mapping:
-            problem = f"the key '{key}' stands twice"
-        if problem:
-            raise MarkedYAMLError(problem=problem, problem_mark=key_node.start_mark)
-        return True
+            raise MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+        return node
 
 
 _LINES = re.compile(r"([!-~][ -~]*\n){2,}")
@@ -121,7 +114,7 @@ class _Blocks(SafeRepresenter):
     def represent_str(self, data: str) -> Any:
         style = "|" if _LINES.fullmatch(data) else None
         short = _without_words(self.dumper.long, data)
-        return self.represent_scalar("tag:yaml.org,2002:str", short, style=style)
+        return self.represent_scalar(_TEXT, short, style=style)
 
 
 _Blocks.add_representer(str, _Blocks.represent_str)
@@ -132,7 +125,7 @@ def _yaml() -> Any:
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.long = {}
     yaml.Representer = _Blocks
-    yaml.Resolver, yaml.Composer, yaml.Constructor = _CoreResolver, _PlainComposer, _UniqueKeys
+    yaml.Resolver, yaml.Composer = _CoreResolver, _PlainComposer
     return yaml
 
 
@@ -195,16 +188,14 @@ def load_yaml(text: str, source: str) -> dict[str, Any]:
         )
     try:
         data = yaml.load(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
+    except YAMLError as error:
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
         what = "" if isinstance(error, _Refused) else "not valid YAML: "
-        advice = "; indent with spaces" if r"'\t'" in (error.problem or "") else ""
-        problem = shortened(error.problem or "", _MAX_PROBLEM)
+        problem = getattr(error, "problem", None) or " ".join(str(error).split())
+        advice = "; indent with spaces" if r"'\t'" in problem else ""
+        problem = shortened(problem, _MAX_PROBLEM)
         raise PlanError(f"{source}: {where}{what}{problem}{advice}") from None
-    except YAMLError as error:
-        problem = shortened(" ".join(str(error).split()), _MAX_PROBLEM)
-        raise PlanError(f"{source}: not valid YAML: {problem}") from None
     except ValueError:  # beyond the digits that Python converts
         raise PlanError(f"{source}: a whole number of thousands of digits") from None
     if not isinstance(data, dict):

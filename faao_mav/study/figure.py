@@ -73,22 +73,15 @@ def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     >>> study_figure(rows, plan, "delivered").axes[0].get_xlabel()
     'height H, m'
     """
-    axis = _axis(rows)
-    if all(row.R_avg is None for row in rows) or (kind != "trajectories" and axis is None):
-        raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
-    return (
-        _rates(rows, plan, kind, axis) if kind != "trajectories" and axis else _routes(rows, plan)
-    )
-
-
-def _axis(rows: Sequence[StudyRow]) -> str | None:
-    """Return the varied key with the most numbers, at least two."""
-    counts: dict[str | None, int] = {None: 1}
+    counts = {"": 1}  # of the numbers of each key
     for key in rows[0].values:
         values = [row.values[key] for row in rows]
         if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
             counts[key] = len(set(values))
-    return max(counts, key=lambda key: counts[key])
+    axis = max(counts, key=lambda key: counts[key])
+    if all(row.R_avg is None for row in rows) or not (axis or kind == "trajectories"):
+        raise InputError("nothing to draw: no result, or no key varied over two numbers or more")
+    return _routes(rows, plan) if kind == "trajectories" else _rates(rows, plan, kind, axis)
 
 
 def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str, axis: str) -> "Figure":
@@ -198,28 +191,23 @@ def pareto(rows: Sequence[StudyRow], key: str) -> tuple[StudyRow, ...]:
     return tuple(best)
 
 
-def _data(row: StudyRow) -> float:
-    """Return what a row delivers, megabytes, or without a bandwidth bit/Hz per slot."""
+def _data(row: StudyRow, time_step: float = 1.0) -> float:
+    """Return what a row delivers, megabytes, or without a bandwidth bit/Hz in slots of such s."""
     if row.delivered_mbytes is not None:
         return row.delivered_mbytes
-    return (row.delivered or 0.0) * len(row.route)
+    return (row.delivered or 0.0) * len(row.route) * time_step
 
 
-def _amounts(rows: Sequence[StudyRow], plan: Plan) -> tuple[list[float], str]:
-    """Return what `rows` deliver, and in which unit."""
-    banded = plan.radio.bandwidth_mhz is not None
-    scale, unit = (1.0, "megabytes") if banded else (plan.flight.time_step, "bit/Hz")
-    return [scale * _data(row) for row in rows], unit
+def _delivered(plan: Plan) -> str:
+    return f"delivered, {'bit/Hz' if plan.radio.bandwidth_mhz is None else 'megabytes'}"
 
 
 def frontier_table(rows: Sequence[StudyRow], plan: Plan, key: str) -> str:
     """Return the points of the frontier as lines of the terminal."""
-    best = pareto(rows, key)
-    amounts, unit = _amounts(best, plan)
-    lines = [f"{_AMOUNTS[key]:>12}  {f'delivered, {unit}':>20}  bit/s/Hz"]
+    lines = [f"{_AMOUNTS[key]:>12}  {_delivered(plan):>20}  bit/s/Hz"]
     lines += [
-        f"{row.values[key]:12g}  {amount:20.4g}  {row.delivered:8.4f}"
-        for row, amount in zip(best, amounts, strict=True)
+        f"{row.values[key]:12g}  {_data(row, plan.flight.time_step):20.4g}  {row.delivered:8.4f}"
+        for row in pareto(rows, key)
     ]
     return "\n".join([*lines, *failures(rows, "points")])
 
@@ -234,7 +222,7 @@ def frontier_figure(rows: Sequence[StudyRow], plan: Plan, key: str) -> "Figure":
     best = pareto(rows, key)
     if not best:
         raise InputError("nothing to draw: no result")
-    amounts, unit = _amounts(best, plan)
+    amounts = [_data(row, plan.flight.time_step) for row in best]
     at = [float(row.values[key]) for row in best]
     colours = colormaps["viridis"](np.linspace(0, 0.9, len(best)))
     with drawing(9.6, 4.4) as figure:
@@ -242,7 +230,7 @@ def frontier_figure(rows: Sequence[StudyRow], plan: Plan, key: str) -> "Figure":
         curve.plot(at, amounts, color="0.6", linewidth=1.2)
         curve.scatter(at, amounts, color=colours, zorder=3)
         curve.set_ylim(bottom=0)
-        label(curve, plan.name or "trade-off", _AMOUNTS[key], f"delivered, {unit}")
+        label(curve, plan.name or "trade-off", _AMOUNTS[key], _delivered(plan))
         for row, colour in zip(best, colours, strict=True):
             routes.plot(*row.route.T, color=colour, linewidth=1.4)
         as_map(routes, plan, "routes, in the colours of the curve")

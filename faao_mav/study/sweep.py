@@ -15,7 +15,7 @@ from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import dbm
-from faao_mav.plan.keys import ALIASES, POWER, unknown_key
+from faao_mav.plan.keys import ALIASES, POWER, not_varied
 from faao_mav.plan.reader import changed
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
@@ -70,7 +70,7 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
     if not sign:
         raise InputError(f"--vary {quote(text)}: give key=start:stop:step or key=value,value")
     key = key.strip()
-    if problem := unknown_key(key):
+    if problem := not_varied(key):
         raise InputError(f"--vary {place_of([key])}: {problem}")
     return key, parse_values(values, f"--vary {key}")
 
