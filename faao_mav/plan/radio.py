@@ -96,6 +96,13 @@ class GainLaw:
         """The map where it is the gain itself, without a law; None otherwise."""
         return None if self.map is None or self.map.above_law else self.map
 
+    def path_gain(self, reference: float) -> PathGain:
+        """Return the law, of a linear gain `reference` at 1 m unless it has its own."""
+        if self.whole:
+            return PathGain(1.0, exponent=0.0)
+        own = reference if self.reference_gain_db is None else linear(self.reference_gain_db)
+        return PathGain(own, self.exponent, self.elevation_db)
+
 
 @section
 class RadioRates:
@@ -227,16 +234,5 @@ class Radio:
     @property
     def path_gains(self) -> tuple[PathGain, PathGain]:
         """The law of each hop's path gain: 0 dB under a map of the gain itself."""
-        first, second = (
-            PathGain(1.0, exponent=0.0)
-            if law.whole
-            else PathGain(
-                self.reference_gain
-                if law.reference_gain_db is None
-                else linear(law.reference_gain_db),
-                law.exponent,
-                law.elevation_db,
-            )
-            for law in self.gain_laws
-        )
-        return first, second
+        first, second = self.gain_laws
+        return first.path_gain(self.reference_gain), second.path_gain(self.reference_gain)

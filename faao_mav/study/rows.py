@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import cache
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Annotated, Any, ClassVar
@@ -74,6 +73,8 @@ class StudyRow:
         default_factory=lambda: np.empty((0, 2)), compare=False
     )
 
+
+_ROW: TypeAdapter[StudyRow] = TypeAdapter(StudyRow)
 
 _RESULTS = [each.name for each in fields(StudyRow) if each.name not in ("key", "values", "route")]
 """The fields of a row that are columns of the table."""
@@ -145,16 +146,11 @@ def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ..
 def _row(line: bytes, where: str) -> StudyRow:
     """Return the row in a line of the file, without its values: the case has them."""
     try:
-        return replace(_adapter().validate_json(line), values={})
+        return replace(_ROW.validate_json(line), values={})
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         told = f"{place_of(first['loc'])}: {first['msg']}".removeprefix(": ")
         raise InputError(f"{where}: no row of a study: {told}; give another directory") from None
-
-
-@cache
-def _adapter() -> TypeAdapter[StudyRow]:
-    return TypeAdapter(StudyRow)
 
 
 def table(rows: Sequence[StudyRow]) -> str:
@@ -209,14 +205,11 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
     for row in rows:
         # as JSON: a position is a list or a mapping, which cannot be looked up
         values = tuple(json.dumps(value).strip('"') for value in row.values.values())
-        rates = found.setdefault(values, {}).setdefault(row.scheme, [])
+        rates = found.setdefault(values, {scheme: [] for scheme in schemes})[row.scheme]
         rates += [] if (rate := getattr(row, measure)) is None else [rate]
     varied = dict.fromkeys(key for row in rows for key in row.values)
     lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
-    lines += [
-        [*values, *(_cell(of_scheme.get(scheme, [])) for scheme in schemes)]
-        for values, of_scheme in found.items()
-    ]
+    lines += [[*values, *map(_cell, rates.values())] for values, rates in found.items()]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
     table = ("  ".join(map(str.rjust, line, widths)) for line in lines)
