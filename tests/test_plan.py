@@ -3,6 +3,7 @@
 import copy
 import json
 import pickle
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, PX4_BODY
 from faao_mav.errors import InputError, PlanError
-from faao_mav.plan import Plan, parse_plan, read_plan, reference
+from faao_mav.plan import Plan, checks, parse_plan, read_plan, reference
 from faao_mav.plan.reader import changed
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 
@@ -108,6 +109,14 @@ def test_message_names_key_value_and_what_is_accepted() -> None:
             wrong.append((changes, missing, message))
     assert wrong == []
     assert len(rows) > 70
+
+
+def test_every_problem_of_a_plan_has_its_row() -> None:
+    folder = Path(checks.__file__).parent
+    rows = [line.split("\t") for line in (folder / "problems.tsv").read_text().splitlines()[1:]]
+    source = "".join((folder / name).read_text() for name in ("checks.py", "fence.py"))
+    told = re.findall(r'(?:wrong\(\s*|^        )"([\w-]+)"[:,)]', source, re.MULTILINE)
+    assert {name for name, _ in rows} == set(told)
 
 
 def test_several_inclusions_mean_what_the_autopilot_makes_of_them() -> None:

@@ -156,13 +156,9 @@ def _whole_map(flight: Flight, given: GainLaw, known: GainMap, key: str) -> Iter
         yield wrong("map-above-0", key=key, most=most)
     for end, place in (("start", flight.start), ("end", flight.end)):
         if not known.covers(place):
-            sides = (
-                f"{side[0]:.6g} to {side[-1]:.6g} m {name}"
-                for side, name in ((known.east, "east"), (known.north, "north"))
-            )
-            yield wrong(
-                "map-end", end=end, place=quote(list(place)), key=key, sides=", ".join(sides)
-            )
+            east, north = (f"{side[0]:.6g} to {side[-1]:.6g}" for side in (known.east, known.north))
+            told = {"place": quote(list(place)), "east": east, "north": north}
+            yield wrong("map-end", end=end, key=key, **told)
 
 
 def _steps(plan: PlanContents) -> Iterator[Problem]:
