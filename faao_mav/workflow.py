@@ -235,14 +235,11 @@ def _height_as_dict(solution: Solution) -> dict[str, Any] | None:
     """Return which height was chosen, m, and what both ends of the choice deliver, bit/s/Hz."""
     if (found := solution.height) is None:
         return None
-    ends = {
-        name: {"altitude": at, "delivered_rate": None if end is None else end.delivered_rate}
-        for name, at, end in (
-            ("least", found.least, found.at_least),
-            ("most", found.most, found.at_most),
-        )
+    ends = {"least": (found.least, found.at_least), "most": (found.most, found.at_most)}
+    return {"altitude": solution.plan.flight.altitude, "tried": found.tried} | {
+        name: {"altitude": at, "delivered_rate": end and end.delivered_rate}
+        for name, (at, end) in ends.items()
     }
-    return {"altitude": solution.plan.flight.altitude, "tried": found.tried, **ends}
 
 
 def flight_as_dict(plan: Plan, flight: Prediction) -> dict[str, Any]:
@@ -279,13 +276,9 @@ def rates_as_dict(plan: Plan, rates: Rates, delivered: float) -> dict[str, Any]:
         "rate_uav_user": rates.R_G,
         "delivered_rate": delivered,
     }
-    has_bandwidth = plan.radio.bandwidth_mhz is not None
     megabits = {name: plan.megabits(rate) for name, rate in named.items()}
-    return {
-        **named,
-        "mbit_per_second": megabits if has_bandwidth else None,
-        "delivered_mbytes": plan.megabytes(delivered),
-    }
+    told = megabits if plan.radio.bandwidth_mhz is not None else None
+    return {**named, "mbit_per_second": told, "delivered_mbytes": plan.megabytes(delivered)}
 
 
 def optimize_plan(
