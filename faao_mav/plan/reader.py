@@ -27,8 +27,8 @@ _MAX_LINES = 6
 """Lines of a message; chosen to fit a small terminal."""
 
 
-MAX_BESIDE = 300_000
-"""Characters of the longest file that a plan names: two of them fit into the plan's text."""
+MAX_BESIDE = 250_000
+"""Characters of the longest file that a plan names: two of them, indented, fit into its text."""
 
 _RATES = (("snr_db", "mbit_per_s"), ("snr_db", "bit_per_s_per_hz"))
 """The columns of a table of rates."""
