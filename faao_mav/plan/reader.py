@@ -188,7 +188,8 @@ def filled_in(data: dict[str, Any], source: str) -> dict[tuple[str, ...], str]:
             if read is None:
                 section[key] = _word(path, path.is_file() and path.stat().st_mtime_ns)
             else:
-                section[key] = read(read_text(path, MAX_BESIDE, "text", PlanError), str(path))
+                most = MAX_BESIDE * (4 if path.suffix.lower() == ".gpx" else 1)  # wordier than CSV
+                section[key] = read(read_text(path, most, "text", PlanError), str(path))
         except InputError as error:
             place = f"{'.'.join(keys[:-1])}: {law}: {key}" if law else ".".join(keys)
             raise PlanError(f"{source}: {place}: {error}") from None
