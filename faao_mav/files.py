@@ -8,6 +8,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -288,3 +289,15 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+def table(name: str) -> Iterator[dict[str, str]]:
+    """Yield the rows of the table `name` of this package by their columns; "-" is nothing.
+
+    >>> next(table("autopilot/failsafes.tsv"))["loss"]
+    'RC lost'
+    """
+    text = resources.files("faao_mav").joinpath(name).read_text(encoding="utf-8")
+    head, *rows = (line.split("\t") for line in text.splitlines())
+    for row in rows:
+        yield {key: "" if each == "-" else each for key, each in zip(head, row, strict=True)}

@@ -11,6 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from faao_mav.autopilot.parameter import ParameterValues
+from faao_mav.files import table
 from faao_mav.mission.command import (
     CIRCLE,
     FENCE_RETURN_POINT,
@@ -49,29 +50,75 @@ def whole(least: int, most: int) -> Codec:
     return codec
 
 
-def flag(value: float) -> float:
-    """Stored as a bit: 1 above 0."""
-    return 1.0 if value > 0 else 0.0
+uint8, uint16, int16 = whole(0, 255), whole(0, 65_535), whole(-32_768, 32_767)
 
 
-def first(codec: Codec) -> Codecs:
-    """Return how param1 alone is stored."""
-    return (codec, dropped, dropped, dropped)
+def _radius(value: float) -> float:
+    """Whole metres, and to which side."""
+    return math.copysign(uint16(abs(value)), value) if abs(value) >= 1 else 0.0
 
 
-NOTHING: Codecs = (dropped, dropped, dropped, dropped)
-"""None of the four parameters is stored."""
+def _turning_radius(value: float) -> float:
+    """Eight bits: above 255 m in tens of metres."""
+    radius = abs(value)
+    stored = uint8(radius) if radius <= 255 else 10 * uint8(float(np.float32(radius) * 0.1))
+    return math.copysign(stored, value) if stored else 0.0
+
+
+def _heading(value: float) -> float:
+    """Degrees from 0 to below 360; NaN, no heading, stays."""
+    turned = float(np.float32(value) % np.float32(360))
+    return 0.0 if turned == 360 else turned  # just below 0 rounds up
+
+
+_CODECS: dict[str, Codec] = {
+    "-": dropped,
+    "single": single,
+    "uint8": uint8,
+    "uint16": uint16,
+    "int8": whole(-128, 127),
+    "int16": int16,
+    "flag": lambda value: 1.0 if value > 0 else 0.0,
+    "direction": lambda value: -1.0 if value < 0 else 1.0,
+    "radius": _radius,
+    "turning_radius": _turning_radius,
+    "heading": _heading,
+}
 
 ALL: Codecs = (single, single, single, single)
-"""All four are."""
+"""All four parameters are stored."""
 
 UNKNOWN: Codecs = (float, float, float, float)
 """It is not known what is stored: everything, as far as is told."""
 
+_NOTHING: Codecs = (dropped, dropped, dropped, dropped)
+_WORDS = {"all": ALL, "nothing": _NOTHING, "unknown": UNKNOWN}
+
+
+def commands_of(vehicle: str) -> tuple[dict[int, Codecs], dict[int, Codecs]]:
+    """Return the commands that `vehicle` takes with a place, and those without one.
+
+    They are those of `commands.tsv`, with what is stored of param1 to param4.
+    """
+    taken: dict[str, dict[int, Codecs]] = {"place": {}, "no place": {}}
+    for row in table("autopilot/commands.tsv"):
+        for told in filter(None, row[vehicle].split("; ")):
+            where, words = told.split(": ")
+            if (codecs := _WORDS.get(words)) is None:
+                one, two, three, four = (_CODECS[word] for word in words.split())
+                codecs = one, two, three, four
+            taken[where][int(row["command"])] = codecs
+    return taken["place"], taken["no place"]
+
+
+def _first(codec: Codec) -> Codecs:
+    return (codec, dropped, dropped, dropped)
+
+
 BESIDE: dict[int, Codecs] = (
-    dict.fromkeys(POLYGON.values(), first(whole(0, 65_535)))
-    | dict.fromkeys(CIRCLE.values(), first(single))
-    | dict.fromkeys((FENCE_RETURN_POINT, RALLY_POINT), NOTHING)
+    dict.fromkeys(POLYGON.values(), _first(uint16))
+    | dict.fromkeys(CIRCLE.values(), _first(single))
+    | dict.fromkeys((FENCE_RETURN_POINT, RALLY_POINT), _NOTHING)
 )
 """What every autopilot measured keeps of the parameters of fence and rally rows: how many vertices
 a polygon has, and the radius of a circle."""

@@ -21,13 +21,13 @@ Sources: ArduPilot's lists of parameters and events of Copter and Plane 4.1 to 4
 1.16: parameter reference, and the module commander (behaviour of its failsafes).
 """
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
 from typing import Literal, NamedTuple, TypeAlias
+
+from faao_mav.files import table
 
 Values: TypeAlias = Mapping[str, float]
 """Parameters by the autopilot's names, in its units."""
@@ -249,12 +249,10 @@ def failsafes(vehicle: str) -> tuple[Failsafe, ...]:
     >>> [each.loss for each in failsafes("arduplane")]
     ['RC lost', 'ground station lost', 'battery low']
     """
-    text = files("faao_mav.autopilot").joinpath("failsafes.tsv").read_text(encoding="utf-8")
     found: dict[str, list[dict[str, str]]] = {}
-    for row in csv.DictReader(text.splitlines(), delimiter="\t"):
+    for row in table("autopilot/failsafes.tsv"):
         if row["vehicle"] == vehicle:
-            stage = {key: "" if value == "-" else value for key, value in row.items()}
-            found.setdefault(row["loss"], []).append(stage)
+            found.setdefault(row["loss"], []).append(row)
 
     def numbers(stages: list[dict[str, str]], column: str) -> Values:
         pairs = (each.split("=") for stage in stages for each in stage[column].split())

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.body import CopterBody
-from faao_mav.autopilot.parameter import Parameter, ParameterValues, row
+from faao_mav.autopilot.parameter import Parameter, ParameterValues, in_si
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.vector import Vector
@@ -138,10 +138,24 @@ class LegDurations(Protocol):
         """
 
 
-def parameter(*told: Any, **more: Any) -> Any:
-    """Declare a field of a `Model`: a `row` whose key is the name of the field."""
-    declared = row("", *told, **more)
-    return field(default=declared.default, metadata={"row": declared})
+def parameter(
+    unit: str,
+    default: float,
+    new: str,
+    old: str = "",
+    factor: float = 0.01,
+    *,
+    least: float = 0.1,
+    greatest: float = math.inf,
+    capped_by: str = "",
+) -> Any:
+    """Declare a field of a `Model`: a parameter whose key is the name of the field.
+
+    Its `new` name has the `unit`, and the `old` one `factor` times it; angles are in degrees.
+    """
+    names = {new: 1.0, old: factor} if old else {new: 1.0}
+    row = in_si(unit, names, float(default), least, greatest, capped_by=capped_by)
+    return field(default=row.default, metadata={"row": row})
 
 
 class Model(ABC):

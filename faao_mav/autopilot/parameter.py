@@ -1,11 +1,12 @@
 """One record for each parameter of an autopilot: its names, unit, default and bounds."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Protocol, TypeAlias
 
+from faao_mav import files
 from faao_mav.autopilot.body import Body
 
 _GENTLE = (1.35, 2.0)
@@ -100,32 +101,38 @@ def table(*parameters: Parameter) -> ParameterTable:
     return MappingProxyType({parameter.key: parameter for parameter in parameters})
 
 
-def row(
-    key: str,
-    unit: str,
-    default: float,
-    new: str,
-    old: str = "",
-    factor: float = 0.01,
-    *,
-    least: float = 0.1,
-    greatest: float = math.inf,
-    **more: Any,
-) -> Parameter:
-    """Return a parameter whose `new` name has the `unit`, and whose `old` one `factor` times it.
+def in_si(unit: str, names: Mapping[str, float], *told: float, **more: Any) -> Parameter:
+    """Return a parameter without a key, `told` its default, least and greatest value.
 
-    Of angles both names and all numbers are in degrees.
+    Of angles all numbers, and what the factors of `names` lead to, are degrees.
     """
-    turn = math.radians(1) if unit.startswith("rad") else 1.0
-    names = {new: turn, old: factor * turn} if old else {new: turn}
-    return Parameter(key, unit, default * turn, names, least * turn, greatest * turn, **more)
+    turn = math.radians(1) if unit.startswith("rad") else 1
+    default, least, greatest = (turn * each for each in told)
+    names = {name: turn * factor for name, factor in names.items()}
+    return Parameter("", unit, default, names, least, greatest, **more)
 
 
-def rule(
-    key: str, default: float, name: str, unit: str = "", least: float = -math.inf
-) -> Parameter:
-    """Return a parameter of checks, fence or return, with one name in all generations."""
-    return Parameter(key, unit, default, {name: 1.0}, least, motion=False)
+def parameters_of(vehicle: str) -> Iterator[Parameter]:
+    """Yield those of the table `parameters.tsv`, beside the fields of flight models.
+
+    Its columns are the fields of `Parameter`, angles in degrees; a name has its factor behind a
+    star, switches and bits have whole numbers. A negative `loiter_radius` turns left; a
+    `return_height` below 0 keeps the height at which the return begins. Sources: ArduPilot's lists
+    of parameters, 4.7, with the names up to 4.7 second; PX4's parameter reference, 1.16.
+    """
+    for row in files.table("autopilot/parameters.tsv"):
+        if vehicle in row["vehicles"].split():
+            default, names = row["default"], (each.split("*") for each in row["names"].split())
+            parameter = in_si(
+                row["unit"],
+                {name: float(*factor or [1]) for name, *factor in names},
+                float(default) if "." in default else int(default),
+                float(row["least"] or -math.inf),
+                float(row["greatest"] or math.inf),
+                either_sign=bool(row["sign"]),
+                motion=bool(row["motion"]),
+            )
+            yield replace(parameter, key=row["key"])
 
 
 @dataclass(frozen=True, slots=True)

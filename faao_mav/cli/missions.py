@@ -246,7 +246,7 @@ def _rules_as_dict(rules: "Sequence[Rule]") -> dict[str, Any]:
     """Return the JSON object of `--rules --json`; null: every autopilot, every type."""
     keys = {"id": "id", "level": "level", "autopilot": "autopilot", "type": "kind"}
     keys |= {"summary": "summary", "source": "source"}
-    return {"rules": [{key: getattr(r, name) for key, name in keys.items()} for r in rules]}
+    return {"rules": [{key: getattr(r, name) or None for key, name in keys.items()} for r in rules]}
 
 
 def _rule_lines(rules: "Sequence[Rule]") -> Iterator[str]:

@@ -7,7 +7,6 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from faao_mav.autopilot import Vehicle
@@ -17,7 +16,7 @@ from faao_mav.errors import InputError, counted
 from faao_mav.fly.telemetry import Ending, Held, Telemetry, read_held
 from faao_mav.mission.item import Home, Mission
 from faao_mav.validate import Check, Limits, check
-from faao_mav.validate.rule import Finding, Level, Rule, rows_of
+from faao_mav.validate.rule import Finding, Level, read_rules
 from faao_mav.validate.speeds import beyond_lean
 from faao_mav.wire import whereabouts
 from faao_mav.wire.machine import Script
@@ -49,10 +48,7 @@ _AT_FENCE: dict[FenceAction, str] = {
     "terminate": "terminates the flight",
 }
 
-_TABLE = {
-    name: Rule(Level(level), name, None, None, "", says, do, "")
-    for level, name, says, do in rows_of(files("faao_mav.fly").joinpath("preflight.tsv"))
-}
+_TABLE = {rule.id: rule for rule in read_rules("fly/preflight.tsv", {})}
 """What stands against a flight, or is worth knowing before it, by the ids of the findings."""
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _MODULES = (delivery, extent, fences, items, peculiar, speeds)
 _CONSTANTS: dict[str, object] = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
 
-RULES = tuple(read_rules(_CONSTANTS))
+RULES = tuple(read_rules("validate/rules.tsv", _CONSTANTS))
 """All rules, in the order of their table, in which findings about one item are given."""
 
 _PLACE = {rule.id: n for n, rule in enumerate(RULES)}

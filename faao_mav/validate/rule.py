@@ -3,13 +3,12 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from itertools import groupby
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.errors import counted
+from faao_mav.files import table
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -59,7 +58,7 @@ class Rule:
     """One thing that is checked.
 
     `id` is short and stays the same from version to version. `autopilot` and `kind` are the
-    autopilot and the type of vehicle that it is about, None: all. `summary` says in a line what is
+    autopilot and the type of vehicle that it is about, "": all. `summary` says in a line what is
     wrong when the rule speaks. `says` is that with the values of a hit, "" where there are none,
     and `do` what to do about it. `source` names where the rule comes from: a function or document
     of the autopilot with its version, a measurement, or the limits that were set.
@@ -67,16 +66,16 @@ class Rule:
 
     level: Level
     id: str
-    autopilot: str | None
-    kind: str | None
-    summary: str
     says: str
     do: str
-    source: str
+    summary: str = ""
+    autopilot: str = ""
+    kind: str = ""
+    source: str = ""
 
     def applies_to(self, vehicle: Vehicle) -> bool:
         """Say whether the rule is about `vehicle`."""
-        return self.autopilot in (None, vehicle.autopilot) and self.kind in (None, vehicle.kind)
+        return self.autopilot in ("", vehicle.autopilot) and self.kind in ("", vehicle.kind)
 
     def finding(self, index: int | None, values: Mapping[str, object]) -> Finding:
         """Return what it says of the item at `index`, with `values` for the names in braces."""
@@ -84,19 +83,11 @@ class Rule:
         return Finding(self.level, self.id, None if index is None else index + 1, says, do)
 
 
-def rows_of(table: Traversable) -> Iterator[list[str]]:
-    """Yield the rows under the head of a `table` with tabs, in which "-" is nothing."""
-    for line in table.read_text(encoding="utf-8").splitlines()[1:]:
-        yield ["" if each == "-" else each for each in line.split("\t")]
-
-
-def read_rules(constants: Mapping[str, object]) -> Iterator[Rule]:
-    """Yield the rules of the table beside this module; a summary may name `constants` in braces."""
-    for level, name, autopilot, kind, summary, says, do, source in rows_of(
-        files("faao_mav.validate").joinpath("rules.tsv")
-    ):
-        about = autopilot or None, kind or None, summary.format_map(constants)
-        yield Rule(Level(level), name, *about, says, do, source)
+def read_rules(name: str, constants: Mapping[str, object]) -> Iterator[Rule]:
+    """Yield the rules of the table `name`; a summary may name `constants` in braces."""
+    for row in table(name):
+        level, summary = Level(row.pop("level")), row.pop("summary", "").format_map(constants)
+        yield Rule(level=level, summary=summary, **row)
 
 
 Hit: TypeAlias = tuple[str, int | None, dict[str, object]]

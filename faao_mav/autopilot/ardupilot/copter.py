@@ -7,13 +7,13 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot import COPTER_DIALECT, SHARED, ardupilot_type, at_fence
+from faao_mav.autopilot.ardupilot import COPTER_DIALECT, ardupilot_type, at_fence
 from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.manners import Modes, failsafes
 from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
-from faao_mav.autopilot.parameter import Parameter, ParameterValues, Recommended, row, rule, table
+from faao_mav.autopilot.parameter import ParameterValues, Recommended, parameters_of, table
 from faao_mav.autopilot.vehicle_type import Orbit, orbit_at
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
@@ -184,22 +184,6 @@ _MODES = Modes(
 SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
 
 
-_TABLE = table(
-    *ArduCopter.parameters(),
-    row("landing_speed", "m/s", 0.5, "LAND_SPD_MS", "LAND_SPEED", least=0.05),
-    row("return_height", "m", 15.0, "RTL_ALT_M", "RTL_ALT", least=0.0, motion=False),
-    *SHARED,
-    rule("fence_options", 0, "FENCE_OPTIONS"),
-    rule("fence_type", 7, "FENCE_TYPE"),
-    row("loiter_radius", "m", 10.0, "CIRCLE_RADIUS_M", "CIRCLE_RADIUS", least=0.0),
-    row("circle_rate", "rad/s", 20, "CIRCLE_RATE", least=-math.inf),
-    Parameter("rally_limit", "m", 300.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
-    rule("rally_home", 1, "RALLY_INCL_HOME"),
-)
-"""Its parameters: the newer names (SI units) first, those up to 4.7 (cm) second. Source: ArduPilot
-4.7, parameter list of Copter."""
-
-
 def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
     """Return how a NAV_LOITER_TURNS is flown (AC_Circle), turning by half of the acceleration.
 
@@ -222,7 +206,7 @@ ARDUCOPTER = ardupilot_type(
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
     modes=_MODES,
     hovers=True,
-    parameters=_TABLE,
+    parameters=table(*ArduCopter.parameters(), *parameters_of("arducopter")),
     dialect=COPTER_DIALECT,
     whole_second_holds=True,
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.ardupilot import PLANE_DIALECT, SHARED, ardupilot_type, at_fence
+from faao_mav.autopilot.ardupilot import PLANE_DIALECT, ardupilot_type, at_fence
 from faao_mav.autopilot.body import ARDUPLANE_BODY, PlaneBody, density_ratio
 from faao_mav.autopilot.manners import Modes, failsafes
 from faao_mav.autopilot.model import (
@@ -23,7 +23,7 @@ from faao_mav.autopilot.model import (
     parameter,
     unit,
 )
-from faao_mav.autopilot.parameter import Parameter, row, rule, table
+from faao_mav.autopilot.parameter import parameters_of, table
 from faao_mav.autopilot.vehicle_type import orbit_at
 from faao_mav.power import GRAVITY
 
@@ -234,27 +234,13 @@ _LOITER, _RTL = 12, 11
 # PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL.
 _MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
 
-_TABLE = table(
-    *ArduPlane.parameters(),
-    row("loiter_radius", "m", 60.0, "WP_LOITER_RAD", least=1, either_sign=True),
-    row("return_height", "m", 100.0, "RTL_ALTITUDE", "ALT_HOLD_RTL", least=-1, motion=False),
-    *SHARED,
-    rule("fence_options", 1, "FENCE_OPTIONS"),
-    rule("fence_type", 4, "FENCE_TYPE"),
-    rule("return_lands", 0, "RTL_AUTOLAND"),
-    Parameter("rally_limit", "m", 5000.0, {"RALLY_LIMIT_KM": 1000.0}, motion=False),
-    rule("rally_home", 0, "RALLY_INCL_HOME"),
-)
-"""ArduPlane's parameters. A negative `loiter_radius` turns left; a `return_height` below 0 keeps
-the height at which the return begins."""
-
 ARDUPLANE = ardupilot_type(
     kind="plane",
     name="ArduPlane",
     mav_types=(1,),
     modes=_MODES,
     hovers=False,
-    parameters=_TABLE,
+    parameters=table(*ArduPlane.parameters(), *parameters_of("arduplane")),
     dialect=PLANE_DIALECT,
     returns_at_least=False,
     at_fence=at_fence({0: "report"}),

@@ -15,18 +15,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import PX4_BODY
-from faao_mav.autopilot.dialect import (
-    ALL,
-    NOTHING,
-    Codecs,
-    Dialect,
-    Limit,
-    SpeedChange,
-    dropped,
-    flag,
-    single,
-    whole,
-)
+from faao_mav.autopilot.dialect import Dialect, Limit, SpeedChange, commands_of
 from faao_mav.autopilot.manners import (
     FenceAction,
     LossAction,
@@ -35,7 +24,7 @@ from faao_mav.autopilot.manners import (
     SetpointRules,
     failsafes,
 )
-from faao_mav.autopilot.parameter import ParameterValues, Recommended, row, rule, table
+from faao_mav.autopilot.parameter import ParameterValues, Recommended, parameters_of, table
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
 from faao_mav.autopilot.vehicle_type import (
     AutopilotFamily,
@@ -158,46 +147,6 @@ def _rally(vehicle: ParameterValues) -> RallyRule:
     return RallyRule(math.inf if kind in (0, 1, 3) else -1.0, home=kind != 1)
 
 
-_SHARED = (
-    rule("takeoff_land_required", 0, "MIS_TKO_LAND_REQ"),
-    rule("first_waypoint_distance", 10_000.0, "MIS_DIST_1WP", "m"),
-    rule("takeoff_height", 2.5, "MIS_TAKEOFF_ALT", "m"),
-    rule("fence_action", 2, "GF_ACTION"),
-    rule("fence_predict", 0, "GF_PREDICT"),
-    rule("fence_distance", 0.0, "GF_MAX_HOR_DIST", "m"),
-    rule("fence_height", 0.0, "GF_MAX_VER_DIST", "m"),
-    rule("return_height", 60.0, "RTL_RETURN_ALT", "m", 0.0),
-    rule("return_type", 0, "RTL_TYPE"),
-)
-"""Mission checks, fence and return; as below by the parameter reference of PX4 1.16."""
-
-
-_COPTER_TABLE = table(
-    *Px4.parameters(),
-    row("greatest_acceleration", "m/s^2", 5.0, "MPC_ACC_HOR_MAX", least=0.1),
-    row("lean_angle", "rad", 45, "MPC_TILTMAX_AIR", least=20, greatest=89),
-    row("max_climb_speed", "m/s", 3.0, "MPC_Z_VEL_MAX_UP"),
-    row("max_descent_speed", "m/s", 1.5, "MPC_Z_VEL_MAX_DN"),
-    row("take_off_speed", "m/s", 1.5, "MPC_TKO_SPEED"),
-    row("landing_speed", "m/s", 0.7, "MPC_LAND_SPEED", least=0.05),
-    *_SHARED,
-)
-"""A PX4 multicopter's parameters."""
-
-_PLANE_TABLE = table(
-    row("cruise_speed", "m/s", 15.0, "FW_AIRSPD_TRIM", least=1.0),
-    row("min_speed", "m/s", 10.0, "FW_AIRSPD_MIN", least=1.0),
-    row("max_speed", "m/s", 20.0, "FW_AIRSPD_MAX", least=1.0),
-    row("roll_limit", "rad", 50, "FW_R_LIM", least=5, greatest=85),
-    row("climb_speed", "m/s", 5.0, "FW_T_CLMB_MAX"),
-    row("descent_speed", "m/s", 5.0, "FW_T_SINK_MAX"),
-    row("landing_angle", "rad", 5, "FW_LND_ANG", least=0, greatest=85),
-    row("acceptance_radius", "m", 10.0, "NAV_ACC_RAD", least=0.05),
-    row("loiter_radius", "m", 80.0, "NAV_LOITER_RAD", least=-math.inf),
-    *_SHARED,
-)
-"""A PX4 plane's parameters."""
-
 CONDITIONS = (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
 """Commands that it takes, and starts no mission with."""
 
@@ -209,34 +158,6 @@ FLIES = FLOWN_TO | {Command.NAV_RETURN_TO_LAUNCH, 187, 211, 4501, 42600}
 """What checkTakeoff counts as flying: actuators, grippers, winches and gates as well."""
 
 
-def _heading(value: float) -> float:
-    """Degrees from 0 to below 360; NaN, no heading, stays."""
-    turned = float(np.float32(value) % np.float32(360))
-    return 0.0 if turned == 360 else turned  # just below 0 rounds up
-
-
-_YAW: Codecs = (dropped, dropped, dropped, _heading)
-_GATE, _ROI = 4501, 80
-
-_PLACED: dict[int, Codecs] = {
-    Command.NAV_WAYPOINT: (single, single, dropped, _heading),
-    Command.NAV_LOITER_UNLIM: (dropped, dropped, single, _heading),
-    Command.NAV_LOITER_TIME: (single, flag, single, flag),
-    Command.NAV_LAND: (dropped, whole(0, 65_535), dropped, _heading),
-    Command.NAV_LOITER_TO_ALT: (flag, single, dropped, flag),
-    **dict.fromkeys((Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND), _YAW),
-    **dict.fromkeys((Command.DO_SET_ROI_LOCATION, Command.DO_SET_ROI, _ROI, _GATE), NOTHING),
-}
-_KEPT_WHOLE = (
-    *(20, _ROI, 93, 112, 114, 178, 179, 187, 189, 196, 197, 200, 201, 203, 204, 205, 206, 211, 212),
-    *(214, 260, 400, 530, 531, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 42_600),
-)
-_UNPLACED: dict[int, Codecs] = {
-    **dict.fromkeys(_KEPT_WHOLE, ALL),
-    Command.DO_JUMP: (whole(-32_768, 32_767), whole(0, 65_535), single, single),
-}
-
-
 def _speed_change(item: MissionItem) -> SpeedChange | None:
     """The type does not matter; what is not above 0 brings the default back."""
     speed = item.params[1]
@@ -244,6 +165,8 @@ def _speed_change(item: MissionItem) -> SpeedChange | None:
 
 
 _SEA, _HOME = Frame.GLOBAL_INT, Frame.GLOBAL_RELATIVE_ALT_INT
+
+_PLACED, _UNPLACED = commands_of("px4")
 
 DIALECT = Dialect(
     name="PX4",
@@ -280,7 +203,7 @@ PX4_COPTER = _px4_type(
     mav_types=(2, 3, 4, 13, 14, 15, 29, 35),
     modes=_MODES,
     hovers=True,
-    parameters=_COPTER_TABLE,
+    parameters=table(*Px4.parameters(), *parameters_of("px4copter")),
     fence_ahead=_fence_ahead,
     flight_model=Px4.from_vehicle,
     recommendation=Recommended(
@@ -298,7 +221,7 @@ PX4_PLANE = _px4_type(
     mav_types=(1,),
     modes=replace(_MODES, guided=None),
     hovers=False,
-    parameters=_PLANE_TABLE,
+    parameters=table(*parameters_of("px4plane")),
     orbits=orbit_at,
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""
