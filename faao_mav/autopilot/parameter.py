@@ -125,7 +125,7 @@ def parameters_of(vehicle: str) -> Iterator[Parameter]:
             default, names = row["default"], (each.split("*") for each in row["names"].split())
             parameter = in_si(
                 row["unit"],
-                {name: float(*factor or [1]) for name, *factor in names},
+                {name: float(factor[0]) if factor else 1.0 for name, *factor in names},
                 float(default) if "." in default else int(default),
                 float(row["least"] or -math.inf),
                 float(row["greatest"] or math.inf),

@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING
 
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.autopilot.dialect import name_of
+from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.errors import FaaoError
 from faao_mav.mission.item import Mission
 from faao_mav.plan import Vector
-from faao_mav.validate import delivery, extent, fences, items, peculiar, speeds
+from faao_mav.validate import delivery, extent, fences, items, peculiar, speeds  # noqa: F401
 from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import EnergyUse, energy_use
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
-from faao_mav.validate.rule import CHECKS, read_rules
+from faao_mav.validate.rule import CHECKS, bound, read_rules
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
@@ -23,8 +24,7 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
     from faao_mav.schedule.prediction import Prediction
 
-_MODULES = (delivery, extent, fences, items, peculiar, speeds)
-_CONSTANTS: dict[str, object] = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
+_CONSTANTS: dict[str, object] = {"bound": bound, "spare": 100 * (OVERSPEED - 1)}
 
 RULES = tuple(read_rules("validate/rules.tsv", _CONSTANTS))
 """All rules, in the order of their table, in which findings about one item are given."""

@@ -19,6 +19,7 @@ from faao_mav.schedule.route import begins_at_speed
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LATE_START, LinkCheck
 from faao_mav.validate.flown import Line, departure
+from faao_mav.validate.rule import bound
 from faao_mav.vector import distances_to_path, lengths
 
 # Seconds about a departure like the plan's, of which the best fit is taken. A mission sets out up
@@ -26,12 +27,6 @@ from faao_mav.vector import distances_to_path, lengths
 _LEADS = np.arange(-MOST_LEAD, MOST_LEAD + 0.05, 0.1)
 # Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen.
 _EVERY = 10
-# Metres below flight.altitude from which a predicted flight has to be clear of the ground that is
-# higher than that. Chosen: lower down it takes off or lands.
-_LOWER = 2.0
-# Degrees and factor of distance by which a slot may be beyond what was measured, and the share of
-# slots that may be farther beyond it. Chosen.
-_ANGLE, _FACTOR, _SHARE = 1.0, 1.05, 0.1
 
 
 def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Prediction]:
@@ -67,7 +62,7 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
 
 def _off_map(plan: Plan, line: Line) -> str:
     """Return where the predicted flight first is in ground or off a map of the gain; "" nowhere."""
-    aloft = line.up > plan.flight.altitude - _LOWER
+    aloft = line.up > plan.flight.altitude - bound.lower
     t, w = line.t[aloft], line.w[aloft]
     low, high = plan.map_edge or ((-np.inf, -np.inf), (np.inf, np.inf))
     off = ((w < low) | (w > high)).any(axis=1)
@@ -92,18 +87,20 @@ def _late_share(solution: Solution, flown: Prediction) -> float | None:
 
 
 def _unmeasured(solution: Solution) -> Iterator[str]:
-    """Yield where more than `_SHARE` of the slots leave what the gain of a hop was measured at."""
+    """Yield where too many of the slots leave what the gain of a hop was measured at."""
     radio, height = solution.plan.radio, solution.plan.flight.altitude
     names = "base station", "ground user"
     for name, station, law in zip(names, radio.stations, radio.gain_laws, strict=True):
         away = lengths(solution.w - station.at(solution.t))
         angle, d = np.degrees(np.arctan2(height, away)), np.hypot(away, height)
         low, high = law.elevation_deg or (-np.inf, np.inf)
-        if np.mean((angle < low - _ANGLE) | (angle > high + _ANGLE)) > _SHARE:
+        beyond = np.maximum(low - angle, angle - high) > bound.unmeasured_angle
+        if np.mean(beyond) > bound.unmeasured_share:
             seen = f"the {name} sees the route {angle.min():.0f} to {angle.max():.0f} degrees high"
             yield f"{seen}; the gain was measured from {low:.0f} to {high:.0f}"
         near, far = law.distance_m or (0.0, np.inf)
-        if np.mean((d < near / _FACTOR) | (d > far * _FACTOR)) > _SHARE:
+        beyond = (d * bound.unmeasured_factor < near) | (d > far * bound.unmeasured_factor)
+        if np.mean(beyond) > bound.unmeasured_share:
             seen = f"the route is {d.min():.0f} to {d.max():.0f} m from the {name}"
             yield f"{seen}; the gain was measured from {near:.0f} to {far:.0f} m"
 

@@ -7,23 +7,7 @@ import numpy as np
 from faao_mav.mission.command import ABOVE_HOME, HOLDING, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import HOME, PlacedItem, ValidationContext
-from faao_mav.validate.rule import Hits, checks, hit
-
-FAR = 10.0  # The distance from home or from item to item, km, that is hardly meant. Chosen.
-# The height, m above ground, that many countries allow without a permission.
-COMMON_CEILING = 120.0
-# The height, m above home, below which an item is about the ground: the estimate of the height is
-# no better. Chosen.
-LEAST_HEIGHT = 1.0
-# The height, m above home, that no vehicle here reaches; plans end there too. Chosen.
-HIGHEST = 20_000.0
-# By how much, m or s, the predicted flight may exceed a limit: aircraft wobble. Chosen.
-_WOBBLE = 1.0
-# Degrees from home within which a place lies if its exchanged coordinates are the slip. Chosen.
-_SWAPPED = 1.0
-# Kilometres from home that no copter, and no plane, flies to. Chosen: twice what they do in the
-# hours that flights are predicted.
-_FARTHEST = {True: 100.0, False: 1_000.0}
+from faao_mav.validate.rule import Hits, bound, checks, hit
 
 
 @checks
@@ -36,7 +20,7 @@ def _beyond(context: ValidationContext) -> Hits:
     for place in context.places:
         away = place.from_origin if context.home is not None else 0.0
         for rule, reached, limit in (
-            ("too-high", place.up, HIGHEST),
+            ("too-high", place.up, bound.highest),
             ("above-ceiling", place.up, limits.max_altitude or math.inf),
             ("beyond-distance", away, limits.max_distance or math.inf),
             ("ardupilot-fence-ceiling", place.up, high),
@@ -56,7 +40,7 @@ def _heights(context: ValidationContext) -> Hits:
         command = context.items[place.index].command
         if place.up < 0 and command not in LANDINGS | TAKEOFFS:
             yield hit("below-home", place.index, below=-place.up, **_raised(context, place))
-        elif place.up < LEAST_HEIGHT and command not in LANDINGS:
+        elif place.up < bound.least_height and command not in LANDINGS:
             yield hit("near-ground", place.index, place=place, **_raised(context, place))
         if place.up < floor and command != Command.NAV_LAND:
             yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
@@ -64,7 +48,9 @@ def _heights(context: ValidationContext) -> Hits:
     if ceiling is not None and height > ceiling:
         newest = context.vehicle.type.parameters["return_height"].newest_name
         yield hit("return-above-ceiling", height=height, name=name, newest=newest)
-    above = (place for place in context.places if place.up > COMMON_CEILING and ceiling is None)
+    above = (
+        place for place in context.places if place.up > bound.common_ceiling and ceiling is None
+    )
     if (highest := max(above, key=lambda place: place.up, default=None)) is not None:
         yield hit("above-120-m", highest.index, place=highest)
 
@@ -81,19 +67,20 @@ def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
 @checks
 def _distances(context: ValidationContext) -> Hits:
     """How far the places are from home, and from each other."""
-    home, farthest = context.mission.home, 1000 * _FARTHEST[context.vehicle.type.hovers]
+    home, hovers = context.mission.home, context.vehicle.type.hovers
+    farthest = 1000 * (bound.farthest_copter if hovers else bound.farthest_plane)
     for place in context.places if home is not None else ():
         away, item = place.from_origin, context.items[place.index]
         if home is not None and away > farthest:
-            swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < _SWAPPED
+            swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < bound.swapped
             slip = "latitude and longitude look exchanged: correct them"
             told = {"away": away / 1000, "slip": slip if swapped else "correct it"}
             yield hit("too-far", place.index, **told)
-        elif context.limits.max_distance is None and away > 1000 * FAR:
+        elif context.limits.max_distance is None and away > 1000 * bound.far:
             yield hit("far-from-home", place.index, away=away / 1000)
     for leg in context.legs:
         near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
-        if leg.length > 1000 * FAR and near and HOME not in (leg.start.index, leg.end.index):
+        if leg.length > 1000 * bound.far and near and HOME not in (leg.start.index, leg.end.index):
             yield hit("long-leg", leg.index, leg=leg, length=leg.length / 1000)
 
 
@@ -110,7 +97,7 @@ def _predicted(context: ValidationContext) -> Hits:
         (limits.max_duration, track.t, "s long; --max-duration"),
     ):
         worst = int(np.argmax(flown))
-        if limit is not None and flown[worst] > limit + _WOBBLE:
+        if limit is not None and flown[worst] > limit + bound.wobble:
             told = {"worst": flown[worst], "what": what, "limit": limit}
             yield hit("predicted-beyond", int(track.item[worst]), **told)
 

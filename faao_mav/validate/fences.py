@@ -13,16 +13,12 @@ from faao_mav.arrays import Flags
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Hits, checks, hit
+from faao_mav.validate.rule import Hits, bound, checks, hit
 
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
 
-# The distance to the fence, m, below which the error of the aircraft's position counts. Chosen;
-# what a change costs is not measured.
-LEAST_MARGIN = 2.0
 _NAMED = 3  # Parts of the fence that a way is told to break, at most. Chosen: more help nobody.
-_STILL = 0.1  # The speed, m/s, below which an aircraft heads nowhere. Chosen.
 
 
 class _Fence:
@@ -123,7 +119,9 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
     if nearest is not None:
         k, margin = nearest
         index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
-        yield hit("fence-close" if margin < LEAST_MARGIN else "fence-margin", index, margin=margin)
+        yield hit(
+            "fence-close" if margin < bound.least_margin else "fence-margin", index, margin=margin
+        )
         keep, name = context.parameter("fence_margin")
         if margin < keep:
             yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)
@@ -157,9 +155,9 @@ def _kept(context: ValidationContext, fence: _Fence) -> Hits:
     speed = np.abs(velocity)
     ahead = vehicle.type.fence_ahead(vehicle, speed)
     if ahead.any():
-        there = context.flown + velocity / np.maximum(speed, _STILL) * ahead
+        there = context.flown + velocity / np.maximum(speed, bound.still) * ahead
         tested = np.asarray(shapely.points(there.real, there.imag))
-        for index, k in _firsts(fence.leave(tested) & (speed > _STILL), track.item):
+        for index, k in _firsts(fence.leave(tested) & (speed > bound.still), track.item):
             yield hit("fence-ahead", index, time=track.t[k], speed=speed[k], ahead=ahead[k])
 
 

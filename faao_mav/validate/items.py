@@ -12,15 +12,12 @@ from faao_mav.mission.command import (
     Command,
 )
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
-from faao_mav.validate.rule import Hits, checks, hit
+from faao_mav.validate.rule import Hits, bound, checks, hit
 
 _LANDING_SEQUENCES = (Command.DO_LAND_START, 188)
 _ENDINGS = (*LANDINGS, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM)
 
 _OTHER_COMMAND = "remove the item, or use a command that the autopilot has"
-
-_LAND = (-430.0, 8849.0)
-"""The lowest and the highest land on Earth, m above sea level: the Dead Sea's shore, Everest."""
 
 
 @checks
@@ -31,7 +28,7 @@ def _beside(context: ValidationContext) -> Hits:
         yield hit("empty")
     if context.items and home is None:
         yield hit("no-home")
-    if home is not None and not _LAND[0] <= home.altitude <= _LAND[1]:
+    if home is not None and not bound.lowest_land <= home.altitude <= bound.highest_land:
         told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
         if math.isnan(home.altitude):
             told = "the file has no height of home: heights above sea level are not checked"

@@ -8,7 +8,7 @@ from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import HOME, NAV_LAST, Straight, ValidationContext, at_zero
-from faao_mav.validate.rule import Hits, checks, hit
+from faao_mav.validate.rule import Hits, bound, checks, hit
 
 _SKIPPED = {
     "copter": (30, 83, 191, 194, 210, 212, 223, 3000),
@@ -29,11 +29,7 @@ _REQUIRED = {
 }
 """The items that bits of ARMING_MIS_ITEMS ask for."""
 
-RALLY_BIT = 32  # The bit of ARMING_MIS_ITEMS that asks for a rally point.
-
-_SAME_HEIGHT = 1.0
-"""The height, m, by which home may be moved in flight: less does not matter. Chosen; at home's own
-it was flown."""
+_RALLY_BIT = 32  # The bit of ARMING_MIS_ITEMS that asks for a rally point.
 
 _TAKEOFFS = {"copter": TAKEOFFS, "plane": {Command.NAV_TAKEOFF}}
 """What gets the aircraft off the ground. A plane without vertical rotors stays there for the other.
@@ -44,14 +40,7 @@ _ON_GROUND = {
     "plane": "it stays there",
 }
 
-_SPARE_ANGLE = 0.1  # How much steeper than FW_LND_ANG PX4 lets an approach be, degrees. PX4's own.
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)  # What an approach may start from.
-# The radius, m, below which an aircraft may miss it. Measured: it is off by up to 0.5 m.
-SMALLEST = 1.0
-# How much smaller, m, the next radius may be: the aircraft flies on that far while it switches.
-_NARROWER = 0.5
-# The turn up to which the way back to a waypoint is no detour, rad. Chosen.
-_STRAIGHT = math.radians(5)
 
 
 @checks
@@ -67,7 +56,7 @@ def _arming(context: ValidationContext) -> Hits:
         yield hit("ardupilot-terrain", above[0], count=len(above), off=off)
     if context.value("return_lands") == 0:
         yield from (hit("ardupilot-land-start", k) for k, _ in context.each(Command.DO_LAND_START))
-    if not bits & RALLY_BIT or context.frame is None:
+    if not bits & _RALLY_BIT or context.frame is None:
         return
     limit = context.value("rally_limit")
     places = (context.frame.to_local(p.latitude, p.longitude) for p in context.mission.rally)
@@ -75,7 +64,7 @@ def _arming(context: ValidationContext) -> Hits:
     if not nearest < (limit or math.inf):
         within = f" within {limit:g} m" if limit else ""
         there = f"the nearest is {nearest:.0f} m away" if nearest < math.inf else "there is none"
-        yield hit("ardupilot-required-rally", bits=bits, within=within, there=there)
+        yield hit("ardupilot-required-rally", bits=bits, bit=_RALLY_BIT, within=within, there=there)
 
 
 @checks
@@ -91,7 +80,7 @@ def _ardupilot_takeoff(context: ValidationContext) -> Hits:
     if 0 < before <= min(takeoffs, default=0):
         yield hit("ardupilot-takeoff-first", takeoffs[0], before=before, does=does)
     for k, item in context.each(Command.DO_SET_HOME):
-        same_height = item.params[0] == 0 and abs(context.height(item)) < _SAME_HEIGHT
+        same_height = item.params[0] == 0 and abs(context.height(item)) < bound.home_moved
         if not same_height and (context.airborne or min(takeoffs, default=k) < k):
             yield hit("ardupilot-set-home", k)
 
@@ -214,7 +203,7 @@ def _px4_takeoff(context: ValidationContext) -> Hits:
 def _landing(context: ValidationContext) -> Hits:
     """The approach to a landing: it starts above it, outside its own orbit, and is not steep."""
     angle = math.degrees(context.value("landing_angle"))
-    slope = math.tan(math.radians(angle + _SPARE_ANGLE))
+    slope = math.tan(math.radians(angle + bound.spare_angle))
     by_index = {place.index: place for place in context.places}
     for k, _ in context.each(Command.NAV_LAND):
         item = context.items[max(k - 1, 0)]
@@ -270,10 +259,14 @@ def _radius(context: ValidationContext) -> Hits:
         held = context.items[leg.index].params[0] > 0  # it is held at all the same
         if leg.start.index != HOME and 0.05 <= leg.length <= radius and not held:
             yield hit("px4-radius-covers-leg", leg.index, leg=leg, radius=radius)
-        if radius < SMALLEST:
+        if radius < bound.smallest_radius:
             yield hit("px4-radius-small", leg.index, radius=radius)
     for (leg, radius), (onward, smaller) in pairwise(_radii(context)):
         passed = leg.end is onward.start and not context.items[leg.index].params[0] > 0
-        if passed and radius > smaller + _NARROWER and leg.turn(onward) > _STRAIGHT:
+        if (
+            passed
+            and radius > smaller + bound.narrower
+            and leg.turn(onward) > math.radians(bound.straight)
+        ):
             told = {"radius": radius, "smaller": smaller, "onward": onward.end}
             yield hit("px4-radius-narrows", leg.index, **told)

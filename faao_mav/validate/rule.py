@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
@@ -81,6 +82,12 @@ class Rule:
         """Return what it says of the item at `index`, with `values` for the names in braces."""
         says, do = (text.format_map(values) for text in (self.says or self.summary, self.do))
         return Finding(self.level, self.id, None if index is None else index + 1, says, do)
+
+
+bound = SimpleNamespace(
+    **{row["name"]: float(row["value"]) for row in table("validate/thresholds.tsv")}
+)
+"""The thresholds of the rules, by their names in the table `thresholds.tsv`."""
 
 
 def read_rules(name: str, constants: Mapping[str, object]) -> Iterator[Rule]:

@@ -14,36 +14,11 @@ from faao_mav.errors import counted
 from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
 from faao_mav.validate.context import HOME, Straight, ValidationContext
-from faao_mav.validate.rule import Hits, checks, hit
+from faao_mav.validate.rule import Hits, bound, checks, hit
 from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
-
-# The share of the commanded speed, %, below which a leg is reported. Chosen.
-REACHED_PERCENT = 80.0
-# The least time, s, that a reported run of slow legs loses: in less, corners are taken and speeds
-# are changed. Chosen.
-TIME_LOST = 2.0
-# The share of the commanded speed, %, below which a row of legs is a crawl. Chosen.
-CRAWL_PERCENT = 50.0
-CRAWL_LEGS = 5  # The least number of legs in a row that make a crawl. Chosen.
-# By how much, %, a mission may command more than the plan's max_speed.
-SPARE_PERCENT = 100 * (OVERSPEED - 1)
-# The length, m, below which a leg is a correction: it has no direction, and nobody speeds up on it.
-# Chosen.
-_SHORTEST = 1.0
-_SLOWEST = 0.1  # The least speed that is reckoned with, m/s, so that times stay finite.
-# The turn, degrees, above which a copter slows down for a corner. Measured on ArduCopter and PX4.
-SHARP = 45.0
-# The turn, rad, beyond which the room that it needs is not reckoned with more. Chosen.
-_REVERSAL = math.radians(179)
-_SLOW = 3.0  # The commanded speed, m/s, up to which corners hardly matter. Chosen.
-# m/s that are missing for want of lean from which on it is told: rounding is less. Chosen.
-_MISSING = 0.1
-# The share of the climbing time that the way over ground may fall short to: less, and the leg is
-# steep. Chosen.
-_CLIMB_SHARE = 0.8
 
 
 @checks
@@ -97,7 +72,7 @@ def beyond_lean(solution: "Solution", vehicle: Vehicle) -> str | None:
     push = np.maximum(*(lengths(solution.a[:-1] + each) for each in (drag[:-1], drag[1:])))
     allowed, slot = vehicle.value("lean_angle"), float(solution.t[1])
     missing = np.maximum(push - lean_acceleration(allowed), 0.0)
-    if slot * missing.sum() < _MISSING:
+    if slot * missing.sum() < bound.missing:
         return None
     return (
         f"the plan asks for a lean of up to {math.degrees(math.atan(push.max() / GRAVITY)):.0f} "
@@ -110,21 +85,21 @@ def beyond_lean(solution: "Solution", vehicle: Vehicle) -> str | None:
 def _slow(context: ValidationContext) -> Hits:
     """Runs of neighbouring legs that stay below their commanded speed."""
     pairs = _reached_speeds(context)
-    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < REACHED_PERCENT * pair[0].speed):
+    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < bound.reached * pair[0].speed):
         if not slow:
             continue
         legs, reached = zip(*run, strict=True)
         mean, commanded = float(np.mean(reached)), float(np.mean([leg.speed for leg in legs]))
         told = {"count": len(legs), "last": legs[-1].index + 1, "asked": max(x.speed for x in legs)}
         lost = sum(
-            leg.length * (1 / max(v, _SLOWEST) - 1 / leg.speed)
+            leg.length * (1 / max(v, bound.slowest) - 1 / leg.speed)
             for leg, v in zip(legs, reached, strict=True)
         )
-        if len(legs) >= CRAWL_LEGS and 100 * mean < CRAWL_PERCENT * commanded:
+        if len(legs) >= bound.crawl_legs and 100 * mean < bound.crawl * commanded:
             spacing = float(np.mean([leg.length for leg in legs]))
             yield hit("crawl", legs[0].index, spacing=spacing, mean=mean, **told)
         # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
-        elif lost >= TIME_LOST and context.link is None:
+        elif lost >= bound.time_lost and context.link is None:
             where = f"on this leg of {legs[0].length:.0f} m"
             if len(legs) > 1:
                 where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
@@ -146,7 +121,7 @@ def _reached_speeds(context: ValidationContext) -> Iterator[tuple[Straight, floa
 
 
 def _long_legs(context: ValidationContext) -> Iterator[Straight]:
-    return (leg for leg in context.legs if leg.length >= _SHORTEST)
+    return (leg for leg in context.legs if leg.length >= bound.shortest)
 
 
 @checks
@@ -188,10 +163,13 @@ def _turns(context: ValidationContext) -> Hits:
     """Corners for which a copter slows down, and those that a plane cannot fly."""
     bank, sharp = context.value("roll_limit"), []
     for before, after, turn in _corners(context):
-        if before.speed > _SLOW and math.degrees(turn) > SHARP:
+        if before.speed > bound.slow and math.degrees(turn) > bound.sharp:
             sharp.append((turn, -before.index, before))
         radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
-        needed, room = radius * math.tan(min(turn, _REVERSAL) / 2), min(before.length, after.length)
+        needed, room = (
+            radius * math.tan(min(turn, math.radians(bound.reversal)) / 2),
+            min(before.length, after.length),
+        )
         if needed > room:
             told = {"turn": math.degrees(turn), "bank": math.degrees(bank), "needed": needed}
             yield hit("turn-too-tight", before.index, leg=before, room=room, **told)
@@ -208,7 +186,7 @@ def _steep(context: ValidationContext) -> Hits:
     for leg in _long_legs(context):
         way, limit = ("climbs", climb) if leg.rise > 0 else ("descends", descent)
         level, vertical = leg.length / leg.speed, abs(leg.rise) / limit
-        steep = math.isfinite(vertical) and level < _CLIMB_SHARE * vertical
+        steep = math.isfinite(vertical) and level < bound.climb_share * vertical
         if steep and leg.index in waypoints and leg.start.index != HOME:
             told = {"rise": abs(leg.rise), "limit": limit, "vertical": vertical, "level": level}
             yield hit(
