@@ -301,3 +301,24 @@ def table(name: str) -> Iterator[dict[str, str]]:
     head, *rows = (line.split("\t") for line in text.splitlines())
     for row in rows:
         yield {key: "" if each == "-" else each for key, each in zip(head, row, strict=True)}
+
+
+class Numbers:
+    """Numbers, by their names."""
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self.__dict__.update(values)
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> float: ...
+
+
+def numbers(name: str, **those: str) -> Numbers:
+    """Return the numbers of the table `name`, "value" by "name", with `those` in other columns.
+
+    >>> numbers("autopilot/constants.tsv", model="px4").cut
+    1.0
+    """
+    rows = (row for row in table(name) if those.items() <= row.items())
+    return Numbers({row["name"]: float(row["value"]) for row in rows})

@@ -4,12 +4,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, TypeAlias
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.errors import counted
-from faao_mav.files import table
+from faao_mav.files import numbers, table
 
 if TYPE_CHECKING:
     from faao_mav.validate.context import ValidationContext
@@ -84,9 +83,7 @@ class Rule:
         return Finding(self.level, self.id, None if index is None else index + 1, says, do)
 
 
-bound = SimpleNamespace(
-    **{row["name"]: float(row["value"]) for row in table("validate/thresholds.tsv")}
-)
+bound = numbers("validate/thresholds.tsv")
 """The thresholds of the rules, by their names in the table `thresholds.tsv`."""
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot import COPTER_DIALECT, ardupilot_type, at_fence
-from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs
+from faao_mav.autopilot.ardupilot.legs import FACTS, ArduCopterLimits, StraightLegs
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.manners import Modes, failsafes
@@ -18,13 +18,6 @@ from faao_mav.autopilot.vehicle_type import Orbit, orbit_at
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
-
-# The share by which an aircraft may be slower than its target before the target's clock waits for
-# it. The autopilot's own.
-_MARGIN = 0.05
-# The speed of the target, m/s, above which the aircraft's nose is along the target's way. Chosen;
-# what a change costs is not measured.
-_HEADED = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +111,7 @@ class _Flight(Flight):
                 return shown
             error = place - body.place
             self._rate += (self._pace(error, velocity, climb) - self._rate) * self._adapting
-            if abs(velocity) > _HEADED:
+            if abs(velocity) > FACTS.headed:
                 body.nose = velocity / abs(velocity)
             body.move(self._asked(error, velocity, push), STEP)
             begin, self.time = self.time, STEP * len(shown)
@@ -146,7 +139,7 @@ class _Flight(Flight):
         if square <= 1e-9:
             return 1.0
         kept = (self._body.velocity - self._limits.position_gain * error) * target.conjugate()
-        return min(max(_MARGIN + (kept.real + climb**2) / square, 0.0), 1.0)
+        return min(max(FACTS.margin + (kept.real + climb**2) / square, 0.0), 1.0)
 
     def _asked(self, error: complex, target: complex, push: complex) -> complex:
         """Return the acceleration that is asked for, m/s²; `push` is the target's."""
@@ -165,11 +158,6 @@ class _Flight(Flight):
         along = math.sqrt(most**2 - across**2)
         return complex(min(along, max(-along, turned.real)), across) * way
 
-
-# The recommended jerk, m/s³, and the one for bends at speed, with the greatest acceleration: its
-# documented maximum. Measured, flown and planned, m rms, on a plan with free ends at 10 m/s: 1.5,
-# with a jerk of 10 4.4.
-_JERK, _LIVELIEST_JERK = 10.0, 20.0
 
 _BRAKE = 17
 _MODES = Modes(
@@ -212,7 +200,7 @@ ARDUCOPTER = ardupilot_type(
     at_fence=at_fence({0: "report", 2: "land", 4: "hold"}),
     failsafes=failsafes("arducopter"),
     flight_model=ArduCopter.from_vehicle,
-    recommendation=Recommended(4.0, (0.5, 5.0), {"jerk": _JERK}, {"jerk": _LIVELIEST_JERK}),
+    recommendation=Recommended(4.0, (0.5, 5.0), {"jerk": FACTS.jerk}, {"jerk": FACTS.liveliest}),
     ceilings={"max_acceleration": ("lean_angle", "acceleration")},
     body=ARDUCOPTER_BODY,
     orbits=_orbit,

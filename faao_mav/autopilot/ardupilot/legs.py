@@ -28,17 +28,11 @@ from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
 from faao_mav.autopilot.vehicle_type import lean_acceleration
+from faao_mav.files import numbers
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
 
-# The least length of the cruise that has room for a second ramp, in jerk times at the speed, of
-# which none is longer than a second: the autopilot's own rule.
-_JERK_TIMES = 12.0
-FASTEST = 40.0  # The speed, m/s, that no leg comes to. Chosen above all that is commanded.
-# How often an interval is halved that holds what is sought, before it lies on a line between both
-# ends. Chosen: of 40 m/s 0.08 are left.
-_HALVINGS = 9
-_LEAST_INPUT_TIME = 0.1  # The autopilot's own lower bound of ATC_INPUT_TC, s.
+FACTS = numbers("autopilot/constants.tsv", model="arducopter")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +78,8 @@ class ArduCopterLimits(Model):
     def rise(self) -> float:
         """t_j: how long the jerk takes to rise, s: twice ATC_INPUT_TC, or what leaning allows."""
         agility = min(self.roll_acceleration or math.inf, self.pitch_acceleration or math.inf)
-        return max(
-            2 * max(self.input_time, _LEAST_INPUT_TIME), math.pi * self.jerk / (GRAVITY * agility)
-        )
+        asked = 2 * max(self.input_time, FACTS.least_input_time)
+        return max(asked, math.pi * self.jerk / (GRAVITY * agility))
 
     def ramp(self, change: Real, acceleration: Real | float | None = None) -> "Ramp":
         """Return ramps by `change` >= 0, m/s, within its own or another `acceleration`, m/s²."""
@@ -113,7 +106,7 @@ def largest(function: Callable[[Real], Real], value: Real, most: Real | float) -
     """Return the largest x, 0 to `most`, at which the rising `function` is at most `value`."""
     low = np.zeros(np.broadcast_shapes(np.shape(value), np.shape(most)))
     high = low + most
-    for _ in range(_HALVINGS):
+    for _ in range(int(FACTS.halvings)):
         middle = (low + high) / 2
         under = function(middle) <= value
         low, high = np.where(under, middle, low), np.where(under, high, middle)
@@ -182,7 +175,7 @@ class StraightLegs:
     @cached_property
     def top(self) -> Real:
         """The greatest speeds that the legs come to, (m - 1,), m/s; above 0 without a length."""
-        found = largest(lambda v: v * self.ramp(v).duration, self.lengths, FASTEST)
+        found = largest(lambda v: v * self.ramp(v).duration, self.lengths, FACTS.fastest)
         return np.maximum(found, 1e-3)
 
     @property
@@ -208,7 +201,7 @@ class StraightLegs:
         lowered = begun * np.maximum(elapsed, edge) / rest
         planned = np.minimum(begun, np.maximum(told, lowered))
         cruise = self.lengths - planned * self.ramp(planned).duration
-        room = cruise / (_JERK_TIMES * min(self.limits.rise, 1.0))
+        room = cruise / (FACTS.jerk_times * min(self.limits.rise, 1.0))
         wanted = np.where(room > planned, np.minimum(told, room), planned)
         slower, change = np.minimum(planned, wanted), np.abs(wanted - planned)
         fits = largest(lambda d: (slower + d / 2) * self.ramp(d).duration, cruise / 2, change)

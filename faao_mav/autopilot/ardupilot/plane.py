@@ -25,22 +25,11 @@ from faao_mav.autopilot.model import (
 )
 from faao_mav.autopilot.parameter import parameters_of, table
 from faao_mav.autopilot.vehicle_type import orbit_at
+from faao_mav.files import numbers
 from faao_mav.power import GRAVITY
 
-# The least radius of a turn over the guidance's look-ahead, both in seconds of flight. Of random
-# plans whose turns had 1.05 at their airspeed, so less over ground against the wind, two were flown
-# 17 and 38 m rms from them; planned with 1.2 over ground these were 5.5 and 6.6 m off.
-_TURN = 1.2
-# The sine of the steepest angle at which a track is approached (ArduPilot's L1 navigation).
-_INTERCEPT = math.sin(radians(45))
-# How long after it is passed a waypoint counts as reached, s. Fitted to the flights that the
-# airframe is, and to eleven of missions that circle: with 0.12 these were flown up to 2 m inside.
-_NOTICED = 0.05
-_HEIGHT_TIME = 2.0  # The time constant with which a height is approached, s. Chosen.
-# The time constant with which a climb follows what the height asks for, s. Chosen.
-_CLIMB_LAG = 1.0
-# The least airspeed with which a flight begins, m/s. Chosen: nothing is divided by 0.
-_SLOWEST = 1.0
+FACTS = numbers("autopilot/constants.tsv", model="arduplane")
+_INTERCEPT = math.sin(radians(FACTS.intercept))
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +92,10 @@ class ArduPlane(Model):
         At a true airspeed V, m/s, total energy control lets it fall by 0.9 g s / V_c and rise by
         0.5 g c / V, with the `descent_speed` s, the `cruise_speed` V_c and the `climb_speed` c (as
         its logs show; in falls from above V_c it counts TECS_SINK_MAX too, which is left out). A
-        turn takes `_TURN` times the look-ahead or longer for a radian.
+        turn takes `turn` times the look-ahead or longer for a radian.
         """
         fall = 0.9 * GRAVITY * self.descent_speed / self.cruise_speed
-        turn = 1 / (_TURN * self.look_ahead)
+        turn = 1 / (FACTS.turn * self.look_ahead)
         return SpeedRates(fall, 0.5 * GRAVITY * self.climb_speed, turn)
 
     def fly(self, path: FlightPath, step: float = 0.1) -> Flown:
@@ -163,7 +152,8 @@ class _Flight(Flight):
             east, north, self._climb = path.entry.tolist()
             airspeed = complex(east, north) - self._wind
             self._demand = plane.true_airspeed(0.0, altitude)
-        self._airspeed, self._heading = max(abs(airspeed), _SLOWEST), cmath.phase(airspeed)
+        self._airspeed = max(abs(airspeed), FACTS.slowest)
+        self._heading = cmath.phase(airspeed)
         self.keep(self._place, self._height, self._velocity, self._climb)
 
     def arrive(self, k: int) -> None:
@@ -175,7 +165,7 @@ class _Flight(Flight):
             turn = min(abs(cmath.phase(before.conjugate() * onward)) / (pi / 2), 1.0)
         while (away := self._away(k, unit(before), turn)) > 0:
             self.move(k, min(STEP, max(away / abs(self._velocity), SHORTEST)))
-        self.move(k, _NOTICED)
+        self.move(k, FACTS.noticed)
 
     def _away(self, k: int, way: complex, turn: float) -> float:
         """Return how far the aircraft is from where point `k` counts as reached, m."""
@@ -211,9 +201,9 @@ class _Flight(Flight):
         self._demand += min(max(self._speeds[k - 1] - self._demand, -fall), rise)
         heeded = -math.expm1(-step / body.airspeed_lag)
         self._airspeed += (self._demand - self._airspeed) * heeded
-        climb = (height - self._height) / _HEIGHT_TIME
+        climb = (height - self._height) / FACTS.height_time
         climb = min(max(climb, -plane.descent_speed), plane.climb_speed)
-        self._climb += (climb - self._climb) * -math.expm1(-step / _CLIMB_LAG)
+        self._climb += (climb - self._climb) * -math.expm1(-step / FACTS.climb_lag)
         self._height += self._climb * step
         turned = aim * velocity.conjugate()
         turn = min(max(math.atan2(turned.imag, turned.real), -pi / 2), pi / 2)

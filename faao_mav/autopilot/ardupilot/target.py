@@ -5,17 +5,8 @@ import math
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.autopilot.ardupilot.legs import ArduCopterLimits, StraightLegs, largest
+from faao_mav.autopilot.ardupilot.legs import FACTS, ArduCopterLimits, StraightLegs, largest
 from faao_mav.autopilot.model import STEP
-
-# The length, m, below which a leg is none: its end counts as reached where it begins.
-_POINT = 1e-6
-# The greatest length of both tangents of a spline together, in lengths of its chord. The
-# autopilot's own.
-_SCALE = 4.0
-# About the distance, m, between the points at which a curve is evaluated. Chosen; what a change
-# costs is not measured.
-_SPACING = 0.5
 
 
 def within(ways: Real, across: Real | float, vertical: Real | float) -> Real:
@@ -57,10 +48,11 @@ class Curve:
             arriving = steps[to] + (step if splines[to + 1] else 0.0)
         chord = float(np.linalg.norm(step))
         tangents = float(np.linalg.norm(leaving) + np.linalg.norm(arriving))
-        scale = min(1.0, _SCALE * chord / tangents) if tangents > 0 else 1.0
+        scale = min(1.0, FACTS.tangents * chord / tangents) if tangents > 0 else 1.0
         leaving, arriving = scale * leaving, scale * arriving
         quadratic, cubic = 3 * step - 2 * leaving - arriving, leaving + arriving - 2 * step
-        x = np.linspace(0.0, 1.0, 1 + int(np.clip(np.ceil(chord / _SPACING), 16, 200)))[:, None]
+        count = int(np.clip(np.ceil(chord / FACTS.spacing), 16, 200))
+        x = np.linspace(0.0, 1.0, 1 + count)[:, None]
         self.points = x * (leaving + x * (quadratic + x * cubic))
         ways = np.gradient(self.points, axis=0)
         spacing = np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
@@ -110,7 +102,7 @@ class Target:
     ) -> None:
         steps = np.diff(points, axis=0)
         count, lengths = len(steps), np.linalg.norm(steps, axis=1)
-        flown = lengths > _POINT
+        flown = lengths > FACTS.point
         ways = steps / np.where(flown, lengths, 1.0)[:, None]
         straight = flown & ~splines[1:]
         joined = straight & np.append(False, straight[:-1])[:count] & ~stopping[:-1]

@@ -26,6 +26,7 @@ from faao_mav.autopilot.manners import (
 )
 from faao_mav.autopilot.parameter import ParameterValues, Recommended, parameters_of, table
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
+from faao_mav.autopilot.px4.guidance import FACTS
 from faao_mav.autopilot.vehicle_type import (
     AutopilotFamily,
     FenceResponse,
@@ -112,9 +113,6 @@ def _at_fence(vehicle: ParameterValues) -> FenceResponse:
     return response if response.keeps else replace(response, set_to="2 (hold) or 3 (return)")
 
 
-_FENCE_CHECKS = 0.2  # The time between two looks at the fence, s. PX4's own.
-
-
 def _fence_ahead(vehicle: ParameterValues, speed: Real) -> Real:
     """How far it is to a stop, by PX4's own estimate; 0 unless GF_PREDICT is set.
 
@@ -129,12 +127,7 @@ def _fence_ahead(vehicle: ParameterValues, speed: Real) -> Real:
     to_fastest = speed * first / jerk + first**3 / (3 * jerk**2)
     peak = np.minimum(limit, np.sqrt(fastest * jerk))  # of the acceleration while it brakes
     braking = fastest / 2 * (fastest / peak + peak / jerk)
-    return np.asarray(to_fastest + braking + _FENCE_CHECKS * speed)
-
-
-_ERROR_LIMIT, _HEIGHT_RADIUS = 10.0, 3.0
-"""The recommended MPC_XY_ERR_MAX and NAV_MC_ALT_RAD, m. Measured: with the default of 2 m progress
-slows whenever the aircraft lags; with that of 0.8 m it missed waypoints for their altitude."""
+    return np.asarray(to_fastest + braking + FACTS.fence_checks * speed)
 
 
 def _rally(vehicle: ParameterValues) -> RallyRule:
@@ -147,12 +140,11 @@ def _rally(vehicle: ParameterValues) -> RallyRule:
     return RallyRule(math.inf if kind in (0, 1, 3) else -1.0, home=kind != 1)
 
 
+LEAST_TAKEOFF: float = FACTS.least_takeoff
+
 CONDITIONS = (Command.CONDITION_DELAY, Command.CONDITION_DISTANCE)
 """Commands that it takes, and starts no mission with."""
 
-LEAST_TAKEOFF = 1e-3
-"""The least height above home, m, that is above 0 to PX4: it adds home's height above the sea, in
-single precision. A billionth was refused."""
 
 FLIES = FLOWN_TO | {Command.NAV_RETURN_TO_LAUNCH, 187, 211, 4501, 42600}
 """What checkTakeoff counts as flying: actuators, grippers, winches and gates as well."""
@@ -209,7 +201,7 @@ PX4_COPTER = _px4_type(
     recommendation=Recommended(
         5.0,
         (2.0, 15.0),
-        {"jerk": 20.0, "error_limit": _ERROR_LIMIT, "height_radius": _HEIGHT_RADIUS},
+        {"jerk": 20.0, "error_limit": FACTS.error_limit, "height_radius": FACTS.height_radius},
     ),
     ceilings={"max_speed": ("max_speed",), "max_acceleration": ("lean_angle", "acceleration")},
     body=PX4_BODY,

@@ -8,30 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.model import SHORTEST, STEP, Copter, Flight, FlightPath, Flown
-from faao_mav.autopilot.px4.guidance import NEAREST, Axis, GuidedLeg, Px4Limits, follow
-
-POSITION_GAIN = 0.95  # MPC_XY_P, 1/s.
-VELOCITY_GAINS = (1.8, 0.4, 0.2)  # MPC_XY_VEL_P_ACC 1/s, MPC_XY_VEL_I_ACC 1/s², MPC_XY_VEL_D_ACC.
-# How long after reaching a waypoint, or after the end of a hold there, the aircraft leaves for the
-# next, s. Fitted to recorded flights.
-SWITCH_DELAY = 0.065
-# How far the position estimate wanders along the way, m: an aircraft on its trajectory is taken to
-# be half of that behind it. Fitted to recorded flights.
-_WANDER = 0.17
-# The least acceptance radius that is asked for on long legs, m. Measured: about 130 flights.
-_RADIUS = 4.0
-# The least acceptance radius that is asked for, m. Measured: where it flies, PX4's aircraft is off
-# by up to 0.5 m for seconds; 0.1 m held it for two minutes, 0.3 m for 6 s.
-_LEAST_RADIUS = 1.0
-# The turn at a waypoint, rad, below which a radius wider than the next one costs nothing. Chosen:
-# at 10 m from the waypoint it is 0.5 m.
-_STRAIGHT = np.radians(3.0)
-# The greatest acceptance radius as a share of the shorter leg at the waypoint. Chosen below 0.5, so
-# that the circles of two waypoints do not meet; a radius as long as its leg counts at once.
-_RADIUS_SHARE = 0.45
-# How much of a corner a wide acceptance radius may cut, m. Chosen; what a change costs is not
-# measured.
-_CUT = 1.0
+from faao_mav.autopilot.px4.guidance import FACTS, Axis, GuidedLeg, Px4Limits, follow
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +18,7 @@ class Px4(Px4Limits):
     A simulation of PX4's own chain: guidance with a look at the next waypoint only, smoothing
     within jerk and acceleration, a clock that runs slower while the aircraft lags behind, a
     cascaded controller and an aircraft with lag and drag. Fitted to recorded flights are the
-    `body`, how the position estimate wanders, and `SWITCH_DELAY`; the rest is PX4's. Limits are SI:
+    `body`, how the position estimate wanders, and `switch_delay`; the rest is PX4's. Limits are SI:
     m, m/s, m/s², m/s³; the defaults are those of PX4 1.16. Wind and the lean limit are left out:
     with the simulator's drag the controller's integral holds against a steady wind from the
     take-off on, and drag takes all of the lean limit at 49 m/s only.
@@ -72,10 +49,10 @@ class Px4(Px4Limits):
         wider than the next: PX4 would first fly back to the waypoint. `stops` (n,)
         marks waypoints at which it waits: those are left from within.
         """
-        cut = _CUT / np.maximum(np.tan(turn / 4), 1e-9)
-        wide = np.where(stops, _RADIUS, np.maximum(_RADIUS, cut))
-        radii = np.maximum(np.minimum(wide, _RADIUS_SHARE * room), _LEAST_RADIUS)
-        for k in reversed(np.flatnonzero((turn > _STRAIGHT) & ~stops)):
+        cut = FACTS.cut / np.maximum(np.tan(turn / 4), 1e-9)
+        wide = np.where(stops, FACTS.radius, np.maximum(FACTS.radius, cut))
+        radii = np.maximum(np.minimum(wide, FACTS.radius_share * room), FACTS.least_radius)
+        for k in reversed(np.flatnonzero((turn > np.radians(FACTS.straight)) & ~stops)):
             radii[k] = min(radii[k], radii[k + 1])
         return radii
 
@@ -90,13 +67,13 @@ class Px4(Px4Limits):
         """
         route, hold = self.legs(path), float(path.holds[0])
         flight = _Flight(self, path)
-        arrivals, departures = [0.0], [hold + SWITCH_DELAY if hold > 0 else 0.0]
+        arrivals, departures = [0.0], [hold + FACTS.switch_delay if hold > 0 else 0.0]
         flight.time = departures[0]
         flight.keep_now()
         for leg in route:
             flight.arrive(leg)
             arrivals.append(flight.time)
-            departures.append(flight.time + SWITCH_DELAY + leg.hold)
+            departures.append(flight.time + FACTS.switch_delay + leg.hold)
             flight.stay(leg, departures[-1])
         if route:
             flight.stay(route[-1], departures[-1] + max(step, STEP))
@@ -141,7 +118,7 @@ class _Flight(Flight):
     def _away(self, leg: GuidedLeg) -> float:
         """Return how far the aircraft is from being accepted at the end, m; 0 and less is in."""
         up = abs(self._axes[2].position - leg.height)
-        nearest = max(self._limits.height_radius, NEAREST)
+        nearest = max(self._limits.height_radius, FACTS.nearest)
         return max(abs(self._body.place - leg.target) - leg.radius, up - nearest)
 
     def _move(self, leg: GuidedLeg, step: float) -> None:
@@ -153,7 +130,7 @@ class _Flight(Flight):
         midway, aim = place + velocity * (step / 2), limits.headed(leg, body.place)
         level = limits.level_setpoint(aim, midway, velocity, self._remembered)
         direction, speed, self._remembered = level
-        lag, (gain, integral, derivative) = place - body.place, VELOCITY_GAINS
+        lag = place - body.place
         self._pace = self._paced(lag, velocity)
         climb, most = 0.0, limits.acceleration
         if self._climbs:
@@ -170,9 +147,10 @@ class _Flight(Flight):
         push = complex(
             east.acceleration + axes[0].acceleration, north.acceleration + axes[1].acceleration
         )
-        lack = velocity + POSITION_GAIN * lag - body.velocity
-        asked = push / 2 + gain * lack + self._integral - derivative * body.acceleration
-        self._integral += integral * lack * step
+        lack = velocity + FACTS.position_gain * lag - body.velocity
+        asked = push / 2 + FACTS.gain * lack + self._integral
+        asked -= FACTS.derivative * body.acceleration
+        self._integral += FACTS.integral * lack * step
         body.move(asked, step)
         self.time += step
         self.keep_now()
@@ -186,5 +164,5 @@ class _Flight(Flight):
         if not velocity:
             return 1.0
         along = (lag * velocity.conjugate()).real / abs(velocity)
-        behind = (along + hypot(along, _WANDER)) / 2
+        behind = (along + hypot(along, FACTS.wander)) / 2
         return 1 - min(behind / self._limits.error_limit, 1.0)

@@ -9,19 +9,9 @@ import numpy as np
 
 from faao_mav.autopilot.body import PX4_BODY, CopterBody
 from faao_mav.autopilot.model import TINY, FlightPath, Model, parameter, unit
+from faao_mav.files import numbers
 
-# The cosine of the angle between velocity and target from which an aircraft no longer counts as
-# turning (about 11 degrees). PX4's own.
-_ALIGNED = 0.98
-_MOVING = 0.2  # The speed, m/s, from which an aircraft counts as turning. Chosen.
-# The least distance, m, at which a turning aircraft aims along its leg. PX4's own.
-_LOOKAHEAD = 5.0
-# The least speed, m/s, to which the slower of the horizontal and the vertical motion holds up the
-# other. PX4's own.
-_SLOW = 0.5
-# Radii below this count as this, m: a real aircraft, whose position wavers by more, arrives at such
-# a waypoint by chance (0.05 m took 53 s), which no prediction foretells.
-NEAREST = 0.05
+FACTS = numbers("autopilot/constants.tsv", model="px4")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +94,7 @@ class Px4Limits(Model):
         speeds = np.where(path.speeds > 0, path.speeds, self.cruise_speed)
         speeds = np.minimum(speeds, self.max_speed)
         radii = np.where(path.radii > 0, path.radii, self.acceptance_radius)[1:]
-        radii = np.maximum(radii, NEAREST)
+        radii = np.maximum(radii, FACTS.nearest)
         places, heights = path.points[:, 0] + 1j * path.points[:, 1], path.points[:, 2]
         moves, rises = np.append(np.diff(places), 0j), np.append(np.diff(heights), 0.0)
         following, holding = np.abs(moves[1:]), path.holds[1:] > 0
@@ -162,11 +152,11 @@ class Px4Limits(Model):
         slowing = self.stopping_speed(distance, passing)
         allowed, speed = min(leg.speed, slowing), abs(velocity)
         heading = (velocity * direction.conjugate()).real / (speed + TINY)
-        if heading >= _ALIGNED or speed <= _MOVING or distance <= leg.radius:
+        if heading >= FACTS.aligned or speed <= FACTS.moving or distance <= leg.radius:
             return direction, allowed, allowed
         rest = offset * leg.along.conjugate()
         if rest.real > 0:
-            reach = max(leg.radius, _LOOKAHEAD)
+            reach = max(leg.radius, FACTS.look_ahead)
             aim = complex(sqrt(max(reach * reach - rest.imag * rest.imag, 0.0)), rest.imag)
             direction = unit(aim * leg.along)
         return direction, min(allowed, remembered), remembered
@@ -183,8 +173,8 @@ class Px4Limits(Model):
         fastest, acceleration = self.vertical(rise)
         left, distance = abs(rise) + TINY, distance + TINY
         climb = min(fastest, self.stopping_speed(left, leg.exit_climb, acceleration))
-        vertical = min(climb, max(speed, _SLOW) * left / distance)
-        speed = min(speed, max(climb, _SLOW) * distance / left)
+        vertical = min(climb, max(speed, FACTS.slow) * left / distance)
+        speed = min(speed, max(climb, FACTS.slow) * distance / left)
         return speed, copysign(vertical, rise)
 
 
