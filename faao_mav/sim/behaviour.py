@@ -22,39 +22,26 @@ COUNT = -1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Behaviour:
-    """The autopilot that a mock is, and how that differs from others.
-
-    Attributes:
-        family: the autopilot.
-        mission_limit: how many items of a mission it holds, home included.
-        answer: what it answers to an item of a list, beside what its dialect refuses of a mission.
-        requested_mode: the custom mode that DO_SET_MODE asks for by its second and third parameter,
-            None if that is none.
-        no_mode: the MAV_RESULT for no such mode.
-        denied: the MAV_RESULT of a mode that it does not enter, and with which it does not arm.
-        returns_by_mode: the types of vehicle that change their mode when a mission has them return.
-        parameters: what ground stations look for beside the parameters that the package knows.
-        numbers_missions: it tells a number for each mission.
-        silent_at_boot: it answers nothing about lists before it is ready.
-        tells_no_place: it tells latitude and longitude 0 as long as it knows none; else nothing.
-        armed_inside_only: it does not arm where home lies outside the fence.
-        infeasible: why a mission is not flown though it was taken, "" if it is.
-        refusals: results to answer an item (or `COUNT`) of a list with, whatever it says.
-    """
+    """The autopilot that a mock is, and how that differs from others."""
 
     family: AutopilotFamily
-    mission_limit: int
+    mission_limit: int  # How many items of a mission it holds, home included
+    # What it answers to an item of a list, beside what its dialect refuses of a mission
     answer: Callable[[MissionType, WireItem], MavResult]
+    # The custom mode that DO_SET_MODE asks for by its second and third parameter, None for none
     requested_mode: Callable[[int, int], int | None]
-    no_mode: int
-    denied: int
-    returns_by_mode: frozenset[str]
+    no_mode: int  # The MAV_RESULT for no such mode
+    denied: int  # That of a mode that it does not enter, and with which it does not arm
+    returns_by_mode: frozenset[str]  # The types whose mode changes when a mission has them return
+    # What ground stations look for beside the parameters that the package knows
     parameters: Mapping[str, float] = field(default_factory=dict)
-    numbers_missions: bool = False
-    silent_at_boot: bool = False
-    tells_no_place: bool = False
-    armed_inside_only: bool = False
+    numbers_missions: bool = False  # It tells a number for each mission
+    silent_at_boot: bool = False  # It answers nothing about lists before it is ready
+    tells_no_place: bool = False  # It tells 0, 0 as long as it knows no place; else nothing
+    armed_inside_only: bool = False  # It does not arm where home lies outside the fence
+    # Why a mission is not flown though it was taken, "" if it is
     infeasible: Callable[[Mission], str] = lambda _: ""
+    # Results to answer an item (or `COUNT`) of a list with, whatever it says
     refusals: Mapping[tuple[int, int], MavResult] = field(default_factory=dict)
 
 

@@ -31,13 +31,7 @@ from faao_mav.wire.messages import SetPositionTargetLocalNed
 _FARTHEST = 1e6
 """Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen."""
 
-_STEP, _LONGEST = 0.05, 60.0
-"""Seconds between two steps towards a setpoint, and the longest that is flown at once: after a
-longer silence it flies on from there. Chosen."""
-
-_STIFFNESS, _PUSH = 1.5, 5.0
-"""How it corrects an error, 1/s, damped critically, and its greatest acceleration towards a
-setpoint, m/s²; chosen: as slow as those simulated, and a lean of 27 degrees."""
+_STEP = 0.05  # Seconds over which its velocity is told. Chosen.
 
 _GROUND = 0.5
 """Metres above home below which it stands on the ground; chosen."""
@@ -54,8 +48,8 @@ class Posture(NamedTuple):
 class Follower:
     """An aircraft that stands at home until it is sent along places, or towards a setpoint.
 
-    `wind`, m/s east and north, is what it flies in: towards setpoints it is no faster than its
-    airspeed. `aim` is the setpoint, None along places. Times are seconds on a clock of its own.
+    `wind`, m/s east and north, is what it flies in: towards setpoints, of which `aim` is the last
+    (None along places), it is no faster than its airspeed. Times are seconds on a clock of its own.
     """
 
     def __init__(self, wind: tuple[float, float]) -> None:
@@ -107,35 +101,21 @@ class Follower:
     def at(self, now: float) -> Posture:
         """Return where it is, and how it moves."""
         if self.aim is None:
-            self._time, (self._p, before) = now, (self._played(t) for t in (now, now - _STEP))
+            at = [now, now - _STEP]
+            self._p, before = np.transpose([np.interp(at, self._t, x) for x in self._places.T])
             self._v = (self._p - before) / _STEP
             k = int(np.searchsorted(self._t, now, side="right")) - 1
             self._item = int(self._items[max(k, 0)])
-        else:
-            self._time = max(self._time, now - _LONGEST)
-            while self._time < now:
-                self._step_to(self.aim, min(_STEP, now - self._time))
+        elif (step := now - self._time) > 0:
+            p, v, a = self.aim
+            since = now - self._since if self._carries_on else 0.0
+            air = (p + v * since + a * since**2 / 2 - self._p) / step - self._wind
+            speed = max(float(np.linalg.norm(air)), 1e-9)
+            self._v = air * min(1.0, self._airspeed / speed) + self._wind
+            self._p = self._p + self._v * step
+            self._p[2] = max(self._p[2], 0.0)
+        self._time = now
         return Posture(self._p, self._v, self._item)
-
-    def _played(self, now: float) -> Real:
-        return np.array([np.interp(now, self._t, each) for each in self._places.T])
-
-    def _step_to(self, aim: Real, step: float) -> None:
-        self._time += step
-        p, v, a = aim
-        if self._carries_on:
-            since = self._time - self._since
-            p, v = p + v * since + a * since**2 / 2, v + a * since
-        a = a + 2 * _STIFFNESS * (v - self._v) + _STIFFNESS**2 * (p - self._p)
-        through_air = self._v + _within(a, _PUSH) * step - self._wind
-        before, self._v = self._v, _within(through_air, self._airspeed) + self._wind
-        self._p = self._p + (before + self._v) / 2 * step
-        self._p[2] = max(self._p[2], 0.0)
-
-
-def _within(vector: Real, most: float) -> Real:
-    """Return `vector`, shortened to the length `most` where it is longer."""
-    return vector * min(1.0, most / max(float(np.linalg.norm(vector)), 1e-9))
 
 
 class Flight:

@@ -25,8 +25,6 @@ from faao_mav.vector import distances_to_path, lengths
 # Seconds about a departure like the plan's, of which the best fit is taken. A mission sets out up
 # to `MOST_LEAD` before its plan. The step of 0.1 s is that of predicted flights.
 _LEADS = np.arange(-MOST_LEAD, MOST_LEAD + 0.05, 0.1)
-# Of so many samples of a flight one is looked at for how near it comes to the plan. Chosen.
-_EVERY = 10
 
 
 def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Prediction]:
@@ -53,7 +51,7 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         altitude_error=line.altitude_error(solution),
         unmeasured=tuple(_unmeasured(solution)),
         off_map=_off_map(plan, line),
-        away=float(distances_to_path(line.w[::_EVERY], solution.w).min()),
+        away=float(distances_to_path(line.w[:: int(bound.every)], solution.w).min()),
         begins=float(track.t[0] - line.t[0]),
         late_share=_late_share(solution, flown),
     )

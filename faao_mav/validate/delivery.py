@@ -18,8 +18,8 @@ def _link(context: ValidationContext) -> Hits:
         return
     if link.planned_delivered < bound.nothing:
         yield hit("link-nothing")
-    for told, instead in _doubtful_values(link.radio) if link.radio else ():
-        yield hit("radio-values", told=told, instead=instead)
+    for told in _doubtful_values(link.radio) if link.radio else ():
+        yield hit("radio-values", told=told)
     for told in link.unmeasured:
         yield hit("link-unmeasured", told=told)
     if link.off_map:
@@ -43,26 +43,18 @@ def _link(context: ValidationContext) -> Hits:
         yield hit("link-moving", late=LATE_START, percent=100 * link.late_share)
 
 
-def _doubtful_values(radio: Radio) -> Iterator[tuple[str, str]]:
-    """Yield what is doubtful about a value of `radio`, and what it may be meant to be."""
+def _doubtful_values(radio: Radio) -> Iterator[str]:
+    """Yield what is doubtful about a value of `radio`."""
     band_mhz = radio.bandwidth_mhz or bound.least_bandwidth
     thermal = bound.thermal + 60 + 10 * math.log10(band_mhz)
     for station, watts in (("relay", radio.relay.noise), ("ground_user", radio.ground_user.noise)):
-        noise, key = dbm(watts), f"radio.{station}.noise_dbm"
-        if noise > bound.most_noise:
-            told = f"{key}: {noise:.4g} dBm is more noise than any receiver has"
-            minus = ": is a minus missing?" if noise > 0 else ""
-            yield told, f"receivers have -80 to -120 dBm{minus}"
-        elif noise < thermal - bound.cooled:
-            wide = f"{band_mhz:g} MHz" if radio.bandwidth_mhz else "even 1 kHz"
-            less = f"less than thermal noise in {wide} ({thermal:.0f} dBm)"
-            density = "if it is a density (dBm/Hz), add 10 log10 of the bandwidth in Hz"
-            yield f"{key}: {noise:.4g} dBm is {less}", density
+        told = f"radio.{station}.noise_dbm: {dbm(watts):.4g} dBm is"
+        if dbm(watts) > bound.most_noise:
+            yield f"{told} more noise than any receiver has"
+        elif dbm(watts) < thermal - bound.cooled:
+            yield f"{told} less than thermal noise in {band_mhz:g} MHz ({thermal:.0f} dBm)"
     powers = {"base_station": radio.base_station.power, "relay": radio.relay.power}
     for station, watts in powers.items():
-        power, key = dbm(watts), f"radio.{station}.power_dbm"
-        if power > bound.most_power:
-            yield (
-                f"{key}: {power:.4g} dBm is {watts:,.4g} W, more than relays transmit",
-                f"if {power:.4g} mW are meant, give {10 * math.log10(power):.1f} (dBm)",
-            )
+        if (power := dbm(watts)) > bound.most_power:
+            told = f"radio.{station}.power_dbm: {power:.4g} dBm is {watts:,.4g} W"
+            yield f"{told}, more than relays transmit"

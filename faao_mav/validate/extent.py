@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from faao_mav.mission.command import ABOVE_HOME, HOLDING, LANDINGS, TAKEOFFS, Command
+from faao_mav.mission.command import HOLDING, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
-from faao_mav.validate.context import HOME, PlacedItem, ValidationContext
+from faao_mav.validate.context import HOME, ValidationContext
 from faao_mav.validate.rule import Hits, bound, checks, hit
 
 
@@ -39,9 +39,9 @@ def _heights(context: ValidationContext) -> Hits:
     for place in context.places:
         command = context.items[place.index].command
         if place.up < 0 and command not in LANDINGS | TAKEOFFS:
-            yield hit("below-home", place.index, below=-place.up, **_raised(context, place))
+            yield hit("below-home", place.index, below=-place.up)
         elif place.up < bound.least_height and command not in LANDINGS:
-            yield hit("near-ground", place.index, place=place, **_raised(context, place))
+            yield hit("near-ground", place.index, place=place)
         if place.up < floor and command != Command.NAV_LAND:
             yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
     height, name = context.parameter("return_height")
@@ -55,27 +55,15 @@ def _heights(context: ValidationContext) -> Hits:
         yield hit("above-120-m", highest.index, place=highest)
 
 
-def _raised(context: ValidationContext, place: PlacedItem) -> dict[str, str]:
-    """Return what to do about a height, and what it is above the sea if it counts from there."""
-    item, home = context.items[place.index], context.mission.home
-    if item.frame in ABOVE_HOME or home is None:
-        return {"sea": "", "instead": "raise the item, unless the ground there is lower than home"}
-    sea = f"{item.z:g} m above sea level, where home is at {home.altitude:g} m: "
-    return {"sea": sea, "instead": "use frame 3, height above home, or raise the item"}
-
-
 @checks
 def _distances(context: ValidationContext) -> Hits:
     """How far the places are from home, and from each other."""
     home, hovers = context.mission.home, context.vehicle.type.hovers
     farthest = 1000 * (bound.farthest_copter if hovers else bound.farthest_plane)
     for place in context.places if home is not None else ():
-        away, item = place.from_origin, context.items[place.index]
-        if home is not None and away > farthest:
-            swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < bound.swapped
-            slip = "latitude and longitude look exchanged: correct them"
-            told = {"away": away / 1000, "slip": slip if swapped else "correct it"}
-            yield hit("too-far", place.index, **told)
+        away = place.from_origin
+        if away > farthest:
+            yield hit("too-far", place.index, away=away / 1000)
         elif context.limits.max_distance is None and away > 1000 * bound.far:
             yield hit("far-from-home", place.index, away=away / 1000)
     for leg in context.legs:

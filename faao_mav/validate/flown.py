@@ -13,23 +13,8 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, positions_at, price_flight
 from faao_mav.schedule.route import set_out
 from faao_mav.schedule.timing import MOST_LEAD
+from faao_mav.validate.rule import bound
 from faao_mav.vector import distances_to_path, lengths
-
-# By so many metres from w_I the departure is told from anything else. Chosen: ten times the path
-# tolerance.
-_REACH = 20.0
-# The share of that reach, rms, within which a departure is the predicted one. An aircraft that
-# stands at w_I instead is 0.45 of it away: sqrt(1/5), where it speeds up steadily. Chosen.
-_ALIKE = 0.25
-# Seconds before the earliest departure that belong to it: the aircraft waits. Chosen.
-_BEFORE = 1.0
-_COARSE, _FINE = 0.4, 0.02  # Steps in which the time of departure is searched, s. Chosen.
-# How many metres off the planned path weigh as much as a second before or after its time, where the
-# path comes by a place more than once, or rests there: as for the end of a flight.
-_METRES_PER_SECOND = 0.5
-# The relay flight ends within so many metres of w_F, and not more than so many seconds before its
-# time. Chosen.
-_AT_END, _AROUND_END = 5.0, 5.0
 
 
 class Line(NamedTuple):
@@ -198,7 +183,7 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     """
     lines = (predicted, Line.planned(solution))
     off, start = min(departure(solution, line, flight) for line in lines)
-    return start if off <= _ALIKE else None
+    return start if off <= bound.alike else None
 
 
 def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float]:
@@ -207,10 +192,10 @@ def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, floa
     How far it is from it, as a share of the way looked at, and when the clock of `line` read 0.
     """
     begin = set_out(solution.t, solution.w, solution.plan) - float(solution.t[0]) - MOST_LEAD
-    begin = max(begin - _BEFORE, float(line.t[0]))
+    begin = max(begin - bound.before, float(line.t[0]))
     after = line.t > begin
     away = lengths(line.w[after] - solution.w[0])
-    reach = min(_REACH, float(away.max()) / 2)
+    reach = min(bound.reach, float(away.max()) / 2)
     end = float(line.t[after][np.argmax(away >= reach)])
     t = np.linspace(begin, end, max(2, round((end - begin) / 0.2)))
     w = line.at(t)
@@ -223,12 +208,12 @@ def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, floa
         at = flight.at((starts[:, None] + t).ravel()).reshape(len(starts), *w.shape)
         return np.asarray(np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1))
 
-    coarse = np.arange(first, last + _COARSE, _COARSE)
+    coarse = np.arange(first, last + bound.coarse, bound.coarse)
     around = coarse[lengths(flight.at(coarse + begin) - w[0]) < reach]
     if not len(around):
         return math.inf, 0.0
     near = around[squares(around).argmin()]
-    fine = np.clip(near + np.arange(-2 * _COARSE, 2 * _COARSE, _FINE), first, last)
+    fine = np.clip(near + np.arange(-2 * bound.coarse, 2 * bound.coarse, bound.fine), first, last)
     found = squares(fine)
     return math.sqrt(found.min()) / reach, float(fine[found.argmin()])
 
@@ -247,7 +232,7 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     step = float(solution.t[1] - solution.t[0])
     slot = int(np.clip(now / step, 0, len(solution.t) - 1))
     forwarded, time_up = step * priced.relayed.forwarded, now >= solution.plan.flight.duration
-    around_end = flight.w[flight.t >= ends - _AROUND_END]
+    around_end = flight.w[flight.t >= ends - bound.around_end]
     return Standing(
         time=now,
         late=behind,
@@ -257,7 +242,7 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
         I_G=float(priced.I_G[slot]),
         delivered=float(forwarded[: None if time_up else slot].sum()),
         expected=float(forwarded.sum()),
-        over=time_up and bool((lengths(around_end - solution.w[-1]) < _AT_END).any()),
+        over=time_up and bool((lengths(around_end - solution.w[-1]) < bound.at_end).any()),
     )
 
 
@@ -265,4 +250,4 @@ def late(solution: Solution, now: float, place: Real) -> float:
     """Return by how many seconds an aircraft at `place` (2,), m, is later than planned at `now`."""
     t = np.arange(0.0, float(solution.t[-1]) + 0.05, 0.1)
     apart = lengths(Line.planned(solution).at(t) - place)
-    return now - float(t[np.argmin(apart + _METRES_PER_SECOND * np.abs(t - now))])
+    return now - float(t[np.argmin(apart + bound.metres_per_second * np.abs(t - now))])

@@ -17,8 +17,6 @@ from faao_mav.validate.rule import Hits, bound, checks, hit
 _LANDING_SEQUENCES = (Command.DO_LAND_START, 188)
 _ENDINGS = (*LANDINGS, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM)
 
-_OTHER_COMMAND = "remove the item, or use a command that the autopilot has"
-
 
 @checks
 def _beside(context: ValidationContext) -> Hits:
@@ -29,16 +27,12 @@ def _beside(context: ValidationContext) -> Hits:
     if context.items and home is None:
         yield hit("no-home")
     if home is not None and not bound.lowest_land <= home.altitude <= bound.highest_land:
-        told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
-        if math.isnan(home.altitude):
-            told = "the file has no height of home: heights above sea level are not checked"
-        yield hit("home-height", told=told)
+        yield hit("home-height", home=home)
     for n, point in enumerate(context.mission.rally, start=1):
         if math.isnan(point.altitude):
-            yield hit("rally-height", place=f"rally point {n}", then="`upload` refuses it")
+            yield hit("rally-height", place=f"rally point {n}")
     if back is not None and math.isnan(back.altitude):
-        place, then = "the return point after a breach", "the vehicle's parameters set it"
-        yield hit("rally-height", place=place, then=then)
+        yield hit("rally-height", place="the return point after a breach")
 
 
 @checks
@@ -55,9 +49,7 @@ def _order(context: ValidationContext) -> Hits:
     if landing < end and any(k > landing for k, _ in context.flying):
         yield hit("flies-on", landing)
     if context.items and not any(context.each(*_ENDINGS)):
-        yield hit(
-            "no-ending", last - 1, does="hovers" if context.vehicle.type.hovers else "circles"
-        )
+        yield hit("no-ending", last - 1)
 
 
 def _ends(context: ValidationContext, index: int) -> bool:
@@ -100,9 +92,8 @@ def _refused(context: ValidationContext) -> Hits:
         unset, refused = dialect.refusal(item), dialect.refusal(dialect.sent(item))
         reason, _, instead = (refused or unset or "").partition("; ")
         if refused is not None:
-            spline = item.command == Command.NAV_SPLINE_WAYPOINT
-            other = "replace it by plain waypoints" if spline else _OTHER_COMMAND
-            yield hit("refused-on-upload", k, reason=reason, instead=instead or other)
+            instead = instead or "remove the item, or use a command that the autopilot has"
+            yield hit("refused-on-upload", k, reason=reason, instead=instead)
         elif unset is not None:
             yield hit("not-set", k, reason=reason, instead=instead)
         if not fits_message(item):
@@ -112,46 +103,28 @@ def _refused(context: ValidationContext) -> Hits:
     if rows > dialect.items.sure and not dialect.unlimited(context.vehicle):
         rule = "storage-full" if rows > dialect.items.most else "storage-tight"
         room = f", or {dialect.make_room}" if dialect.make_room else ""
-        home = " with home" if dialect.home_row else ""
-        yield hit(rule, rows=rows, home=home, fit=dialect.items, room=room)
+        yield hit(rule, rows=rows, fit=dialect.items, room=room)
 
 
-_RADIUS, _YAW = 1, 3
-_MEANING = {_RADIUS: " (acceptance radius)", 2: " (pass-by radius)", _YAW: " (yaw)"}
-"""What the parameters of a waypoint mean, counted from 0."""
-_INSTEAD = {
-    _RADIUS: "set WPNAV_RADIUS (WP_RADIUS_M), which holds for all waypoints",
-    _YAW: "put a CONDITION_YAW before the waypoint",
-}
-"""What to do for them where the vehicle hovers."""
+_YAW = 3  # The parameter of a waypoint that is its yaw, counted from 0.
 
 
 @checks
 def _stored(context: ValidationContext) -> Hits:
     """What the vehicle's storage loses."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
-    hovers = context.vehicle.type.hovers
     for k, item, stored in context.stored:
-        waypoint, of = item.command == Command.NAV_WAYPOINT, item.command
         for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):
             turned = n == _YAW and _same(value % 360, kept)
-            if _same(value, kept) or turned or of not in FLOWN_TO:
+            if _same(value, kept) or turned or item.command not in FLOWN_TO:
                 continue
-            if n == 0 and of in HOLDING:
-                instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
-                if waypoint and not hovers:
-                    instead = "use NAV_LOITER_TIME: a plane waits in a circle"
-                yield hit("hold-changed", k, kept=kept, instead=instead)
+            if n == 0 and item.command in HOLDING:
+                yield hit("hold-changed", k, kept=kept)
             elif value != 0:
-                found.setdefault((of, n), []).append((k, value, kept))
-    for (of, n), places in found.items():
-        k, value, kept = places[0]
-        waypoint = of == Command.NAV_WAYPOINT
-        meaning = _MEANING.get(n, "") if waypoint else ""
-        more = f", and so in {len(places)} items" if places[1:] else ""
-        other = _INSTEAD.get(n) if waypoint and hovers else None
-        told = {"value": value, "kept": kept, "meaning": meaning, "more": more}
-        yield hit("value-dropped", k, n=n + 1, instead=other or "write what can be stored", **told)
+                found.setdefault((item.command, n), []).append((k, value, kept))
+    for (_, n), [(k, value, kept), *rest] in found.items():
+        more = f", and so in {len(rest) + 1} items" if rest else ""
+        yield hit("value-dropped", k, n=n + 1, value=value, kept=kept, more=more)
 
 
 def _same(value: float, kept: float) -> bool:

@@ -35,11 +35,6 @@ _TAKEOFFS = {"copter": TAKEOFFS, "plane": {Command.NAV_TAKEOFF}}
 """What gets the aircraft off the ground. A plane without vertical rotors stays there for the other.
 Measured."""
 
-_ON_GROUND = {
-    "copter": "AUTO is refused (Missing Takeoff Cmd), or it disarms after 10 s",
-    "plane": "it stays there",
-}
-
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)  # What an approach may start from.
 
 
@@ -70,15 +65,14 @@ def _arming(context: ValidationContext) -> Hits:
 @checks
 def _ardupilot_takeoff(context: ValidationContext) -> Hits:
     """How the mission begins, and home that is moved after that."""
-    takeoffs = [k for k, _ in context.each(*_TAKEOFFS.get(context.vehicle.kind, ()))]
-    does, before = _ON_GROUND.get(context.vehicle.kind, ""), 0
+    takeoffs, before = [k for k, _ in context.each(*_TAKEOFFS.get(context.vehicle.kind, ()))], 0
     if context.items and not takeoffs:
         air = context.airborne
-        yield hit("ardupilot-begins-in-the-air" if air else "ardupilot-no-takeoff", does=does)
+        yield hit("ardupilot-begins-in-the-air" if air else "ardupilot-no-takeoff")
     if takeoffs and not context.airborne:
         before = next(k + 1 for k, command in context.flying if command != Command.NAV_DELAY)
     if 0 < before <= min(takeoffs, default=0):
-        yield hit("ardupilot-takeoff-first", takeoffs[0], before=before, does=does)
+        yield hit("ardupilot-takeoff-first", takeoffs[0], before=before)
     for k, item in context.each(Command.DO_SET_HOME):
         same_height = item.params[0] == 0 and abs(context.height(item)) < bound.home_moved
         if not same_height and (context.airborne or min(takeoffs, default=k) < k):
@@ -164,12 +158,9 @@ def _px4_takeoff(context: ValidationContext) -> Hits:
     """Where the take-off stands, where it leads, and whether there has to be one."""
     takeoffs = [k for k, _ in context.each(*TAKEOFFS)]
     before = next((k for k, item in enumerate(context.items) if item.command in FLIES), 0)
-    which, instead = "the take-off comes", f"move it before item {before + 1}"
-    if before in takeoffs:
-        which, instead = "a second take-off,", "remove it"
     for k in takeoffs:
         if before < k:
-            yield hit("px4-takeoff-first", k, which=which, before=before + 1, instead=instead)
+            yield hit("px4-takeoff-first", k, before=before + 1)
     radius, radius_name = context.parameter("acceptance_radius")
     first, height_name = context.parameter("takeoff_height")
     told = {"radius": radius_name, "height": height_name, "old": radius + 1, "first": first}
@@ -184,19 +175,10 @@ def _px4_takeoff(context: ValidationContext) -> Hits:
             yield hit("px4-takeoff-elsewhere", place.index, place=place)
     required = int(context.value("takeoff_land_required", 0))
     takeoff, landing = bool(takeoffs), any(context.each(Command.NAV_LAND))
-    what, there = {
-        0: ("nothing", True),
-        1: ("a take-off", takeoff),
-        2: ("a landing", landing),
-        3: ("a take-off and a landing", takeoff and landing),
-        4: ("both a take-off and a landing, or neither", takeoff == landing),
-        # 5 asks for both on the ground, in the air for what 2 does
-        5: ("both a take-off and a landing, or neither", takeoff == landing),
-    }.get(required, ("nothing", True))
-    if not there:
-        missing = Command.NAV_LAND if takeoff else Command.NAV_TAKEOFF
-        rule = "px4-takeoff-or-landing-missing"
-        yield hit(rule, required=required, what=what, missing=missing.name)
+    both = takeoff == landing  # 5 asks for both on the ground, in the air for what 2 does
+    there = {1: takeoff, 2: landing, 3: takeoff and landing, 4: both, 5: both}
+    if not there.get(required, True):
+        yield hit("px4-takeoff-or-landing-missing", required=required)
 
 
 @checks
@@ -231,16 +213,15 @@ def _land_start(context: ValidationContext) -> Hits:
     starts = [k for k, _ in context.each(Command.DO_LAND_START)]
     for second in starts[1:]:
         what = f"a second DO_LAND_START, after item {starts[0] + 1}"
-        yield hit("px4-land-start", second, what=what, instead="remove it")
+        yield hit("px4-land-start", second, what=what)
     for start in starts[:1]:
         what = f"a return to launch after the DO_LAND_START of item {start + 1}"
         for k, _ in context.each(Command.NAV_RETURN_TO_LAUNCH):
             if k > start:
-                yield hit("px4-land-start", k, what=what, instead="remove one of both")
+                yield hit("px4-land-start", k, what=what)
         # The landing's approach, the item before it, may be the DO_LAND_START itself.
         if not any(k - 1 >= start for k, _ in context.each(*LANDINGS)):
-            what = "there is no landing after DO_LAND_START"
-            yield hit("px4-land-start", start, what=what, instead="add NAV_LAND, or remove it")
+            yield hit("px4-land-start", start, what="there is no landing after DO_LAND_START")
 
 
 def _radii(context: ValidationContext) -> Iterator[tuple[Straight, float]]:

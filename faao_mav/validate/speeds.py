@@ -90,7 +90,8 @@ def _slow(context: ValidationContext) -> Hits:
             continue
         legs, reached = zip(*run, strict=True)
         mean, commanded = float(np.mean(reached)), float(np.mean([leg.speed for leg in legs]))
-        told = {"count": len(legs), "last": legs[-1].index + 1, "asked": max(x.speed for x in legs)}
+        told = {"last": legs[-1].index + 1, "asked": max(leg.speed for leg in legs)}
+        told["legs"] = counted(len(legs), "leg")
         lost = sum(
             leg.length * (1 / max(v, bound.slowest) - 1 / leg.speed)
             for leg, v in zip(legs, reached, strict=True)
@@ -100,11 +101,8 @@ def _slow(context: ValidationContext) -> Hits:
             yield hit("crawl", legs[0].index, spacing=spacing, mean=mean, **told)
         # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
         elif lost >= bound.time_lost and context.link is None:
-            where = f"on this leg of {legs[0].length:.0f} m"
-            if len(legs) > 1:
-                where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
-            span = " to ".join(dict.fromkeys(f"{each(reached):.1f}" for each in (min, max)))
-            yield hit("speed-not-reached", legs[0].index, where=where, span=span, **told)
+            least, most = min(reached), max(reached)
+            yield hit("speed-not-reached", legs[0].index, least=least, most=most, **told)
 
 
 def _reached_speeds(context: ValidationContext) -> Iterator[tuple[Straight, float]]:
