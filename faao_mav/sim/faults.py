@@ -12,8 +12,7 @@ from faao_mav.wire.link import WireLink
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transport import Origin, Transport
 
-_PATIENCE = 0.1
-"""Seconds between two looks at whether to stop serving."""
+_PATIENCE = 0.1  # Seconds between two looks at whether to stop serving.
 
 
 @dataclass(frozen=True, slots=True)

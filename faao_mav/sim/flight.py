@@ -28,13 +28,9 @@ from faao_mav.mission.fence_area import FreeArea, areas_of
 from faao_mav.mission.item import Home, Mission
 from faao_mav.wire.messages import SetPositionTargetLocalNed
 
-_FARTHEST = 1e6
-"""Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen."""
-
+_FARTHEST = 1e6  # Setpoints farther away, m, or beyond that in m/s or m/s² are none; chosen.
 _STEP = 0.05  # Seconds over which its velocity is told. Chosen.
-
-_GROUND = 0.5
-"""Metres above home below which it stands on the ground; chosen."""
+_GROUND = 0.5  # Metres above home below which it stands on the ground; chosen.
 
 
 class Posture(NamedTuple):

@@ -21,17 +21,13 @@ from faao_mav.wire.messages import CommandLong, Envelope, Message, Statustext
 from faao_mav.wire.protocol import Address, MavCommand, MavSeverity, MavState, MissionType
 from faao_mav.wire.wire_items import home_items, mission_of
 
-_ACCEPTED, _DENIED, _UNSUPPORTED, _FAILED = 0, 2, 3, 4
-"""MAV_RESULT."""
+_ACCEPTED, _DENIED, _UNSUPPORTED, _FAILED = 0, 2, 3, 4  # MAV_RESULT.
 
 _SET_MODE = 11  # The number of SET_MODE.
-
 _CUSTOM_MODE, _AUTO = 1, 4 | 8 | 16
 """MAV_MODE_FLAG: a custom mode is set; automatic, guided and stabilised."""
 
-_LATE = 0.05
-"""Seconds by which `tick` is overdue that make a sped up flight stand still; chosen."""
-
+_LATE = 0.05  # Seconds by which `tick` is overdue that make a sped up flight stand still; chosen.
 _CAPABILITIES = 1 | 4 | 8 | 8192 | 16_384 | 32_768
 """MISSION_FLOAT, MISSION_INT, COMMAND_INT, MAVLINK2, MISSION_FENCE and MISSION_RALLY."""
 

@@ -16,8 +16,7 @@ from faao_mav.wire.parameters import carried, value_in
 from faao_mav.wire.protocol import ALL_TYPES, Address, MavResult, MavSeverity, MissionType
 from faao_mav.wire.wire_items import home_items, mission_item, mission_of, wire_item
 
-_INT32, _REAL32 = 6, 9
-"""MAV_PARAM_TYPE of whole numbers, and of single-precision ones."""
+_INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE of whole numbers, and of single-precision ones.
 
 
 @dataclass(slots=True)
