@@ -189,7 +189,11 @@ class _Walk:
             wind=self._wind,
             entry=self._parts[-1][2][-1] if on_its_way else None,
         )
-        self._check_clock(self._at_least(path))
+        # what it takes at least, without ramps
+        ways = np.diff(path.points, axis=0)
+        level, rise = np.hypot(ways[:, 0], ways[:, 1]) / path.speeds, ways[:, 2]
+        limit = np.where(rise > 0, *map(self._changed.value, ("climb_speed", "descent_speed")))
+        self._check_clock(float(np.maximum(level, np.abs(rise) / limit).sum() + np.sum(holds)))
         flown = self._model.fly(path, self._step)
         self._reached[items[1:]] = self._clock + flown.departures[1:]
         end = flown.departures[-1]
@@ -198,13 +202,6 @@ class _Walk:
         columns = np.hstack([flown.position, flown.velocity]).T
         samples = np.stack([np.interp(t, flown.t, column) for column in columns], axis=-1)
         self._show(items[1:][leg], t, samples[:, :3], samples[:, 3:])
-
-    def _at_least(self, path: FlightPath) -> float:
-        """Return how long `path` takes without ramps, s."""
-        ways = np.diff(path.points, axis=0)
-        level, rise = np.hypot(ways[:, 0], ways[:, 1]) / path.speeds, ways[:, 2]
-        limit = np.where(rise > 0, *map(self._changed.value, ("climb_speed", "descent_speed")))
-        return float(np.maximum(level, np.abs(rise) / limit).sum() + np.sum(path.holds))
 
     def _take_off(self, index: int, item: MissionItem) -> None:
         self._fly()

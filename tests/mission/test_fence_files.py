@@ -1,8 +1,6 @@
-"""Fences from KML, KMZ and GeoJSON: whether a zone is one to stay in or out of above all."""
+"""Fences from KML and GeoJSON: whether a zone is one to stay in or out of above all."""
 
-import io
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -116,25 +114,6 @@ def test_polygons_of_kml_with_holes_and_exclusions() -> None:
     for encoding in ("utf-8-sig", "utf-16", "iso-8859-1", "windows-1252"):
         text = KML.replace("UTF-8", encoding.removesuffix("-sig")).replace("school", "école")
         assert kml_fence(text.encode(encoding)).polygons[2].name == "école"
-
-
-def test_kml_in_an_archive() -> None:
-    archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-        file.writestr("files/picture.png", b"")
-        file.writestr("doc.kml", KML)
-    assert kml_fence(archive.getvalue()) == kml_fence(KML.encode())
-    for content, told in ((archive.getvalue()[:60], "not a KMZ archive"), (b"PK\3\4", "not a KMZ")):
-        with pytest.raises(MissionFileError, match=told):
-            kml_fence(content)
-    for name, text, told in (
-        ("doc.txt", KML, r"an archive without a \.kml file"),
-        ("doc.kml", " " * 10_000_000, "larger than 4,000,000 bytes"),
-    ):
-        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-            file.writestr(name, text)
-        with pytest.raises(MissionFileError, match=told):
-            kml_fence(archive.getvalue())
 
 
 def test_the_parts_of_an_inclusion_are_one_area() -> None:

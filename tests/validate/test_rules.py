@@ -58,8 +58,6 @@ def test_a_doubtful_radio_is_told_with_the_likely_slip() -> None:
         check("radio-values", judged(trips), None, judged(passes))
         told = judged(trips).by("radio-values")[0]
         assert action in told.action
-        assert ("minus" in told.action) == (trips.get(noise, 0) > 0)
-        assert ("even 1 kHz" in told.message) == (trips == {noise: -174})
 
 
 def test_a_route_beyond_what_the_gain_was_measured_at_is_told() -> None:

@@ -120,12 +120,6 @@ def at_fence(actions: Mapping[int, FenceAction]) -> Callable[[ParameterValues], 
     return response
 
 
-def _rally_rule(vehicle: ParameterValues) -> RallyRule:
-    """Return where a return goes (ArduPilot 4.7, AP_Rally)."""
-    limit = vehicle.value("rally_limit")
-    return RallyRule(limit if limit > 0 else math.inf, vehicle.value("rally_home") != 0)
-
-
 ardupilot_type = partial(
     VehicleType,
     family=ARDUPILOT,
@@ -133,7 +127,10 @@ ardupilot_type = partial(
     fence_needs_one_inclusion=lambda vehicle: int(vehicle.value("fence_options")) & _UNION != 0,
     home_outside_fence="with FENCE_ENABLE 1 ArduPilot does not arm there",  # measured on 4.7
     models_wind=True,
-    rally=_rally_rule,
+    rally=lambda vehicle: RallyRule(  # AP_Rally
+        limit if (limit := vehicle.value("rally_limit")) > 0 else math.inf,
+        vehicle.value("rally_home") != 0,
+    ),
 )
 """Makes the `VehicleType` of what ArduPilot flies."""
 

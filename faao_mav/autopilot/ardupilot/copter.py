@@ -14,7 +14,7 @@ from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.manners import Modes, failsafes
 from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
 from faao_mav.autopilot.parameter import ParameterValues, Recommended, parameters_of, table
-from faao_mav.autopilot.vehicle_type import Orbit, orbit_at
+from faao_mav.autopilot.vehicle_type import Orbit, lean_acceleration, orbit_at
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem
@@ -84,7 +84,7 @@ class _Flight(Flight):
     ) -> None:
         super().__init__(path.longest)
         stops, waits = target.passed[stopping].tolist(), path.holds[stopping].tolist()
-        self._limits, self._lean = limits, limits.lean
+        self._limits, self._lean = limits, lean_acceleration(limits.lean_angle)
         self._stops = list(zip(stops, waits, strict=True))
         self._clock, self._rate, self._resume, self.arrivals = 0.0, 1.0, waits[0], [0.0]
         self._adapting = -math.expm1(-STEP * limits.jerk / limits.acceleration)

@@ -27,7 +27,6 @@ from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, CopterBody
 from faao_mav.autopilot.model import Model, parameter
-from faao_mav.autopilot.vehicle_type import lean_acceleration
 from faao_mav.files import numbers
 from faao_mav.geodesy import LocalFrame
 from faao_mav.power import GRAVITY
@@ -90,16 +89,6 @@ class ArduCopterLimits(Model):
         steady = change > most * full
         duration = np.where(steady, change / most + full, 2 * free) * (change > 0)
         return Ramp(duration, np.where(steady, full, free), rise / 2)
-
-    @property
-    def corner(self) -> float:
-        """The greatest acceleration in a corner, m/s²."""
-        return self.corner_acceleration or 2 * self.acceleration
-
-    @property
-    def lean(self) -> float:
-        """The acceleration at the largest lean angle, m/s²."""
-        return lean_acceleration(self.lean_angle)
 
 
 def largest(function: Callable[[Real], Real], value: Real, most: Real | float) -> Real:

@@ -174,6 +174,7 @@ def _half_overlaps(legs: StraightLegs, ways: Real, top: Real, begun: Real, slowe
     """
     ending, beginning = legs.ramp(top)[:-1], legs.ramp(begun)[1:]
     cosine, limits = np.sum(ways[:-1] * ways[1:], axis=1), legs.limits
+    corner = limits.corner_acceleration or 2 * limits.acceleration
 
     def excess(h: Real) -> Real:
         left, slow, brake = top[:-1] * ending.at(h)
@@ -181,7 +182,7 @@ def _half_overlaps(legs: StraightLegs, ways: Real, top: Real, begun: Real, slowe
         apart = left**2 + gone**2 - 2 * left * gone * cosine
         speed = slow**2 + fast**2 + 2 * slow * fast * cosine
         turn = brake**2 + push**2 - 2 * brake * push * cosine
-        limit = limits.radius**2, slowest**2, limits.corner**2
+        limit = limits.radius**2, slowest**2, corner**2
         worst: Real = np.max(np.array([apart, speed, turn]) / np.broadcast_arrays(*limit), axis=0)
         return worst
 

@@ -36,7 +36,6 @@ from faao_mav.autopilot.vehicle_type import (
 )
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import FLOWN_TO, Command, Frame
-from faao_mav.mission.item import MissionItem
 
 _RADIUS = 6_371_000.0  # The radius of PX4's Earth, m.
 
@@ -150,12 +149,6 @@ FLIES = FLOWN_TO | {Command.NAV_RETURN_TO_LAUNCH, 187, 211, 4501, 42600}
 """What checkTakeoff counts as flying: actuators, grippers, winches and gates as well."""
 
 
-def _speed_change(item: MissionItem) -> SpeedChange | None:
-    """The type does not matter; what is not above 0 brings the default back."""
-    speed = item.params[1]
-    return SpeedChange("horizontal", speed if speed > 0 else None)
-
-
 _SEA, _HOME = Frame.GLOBAL_INT, Frame.GLOBAL_RELATIVE_ALT_INT
 
 _PLACED, _UNPLACED = commands_of("px4")
@@ -174,7 +167,8 @@ DIALECT = Dialect(
     unplaced=_UNPLACED,
     frames={0: _SEA, 3: _HOME, 5: _SEA, 6: _HOME},
     idle_frames={2: Frame.MISSION},
-    speed_change=_speed_change,
+    # whatever its type; what is not above 0 brings the default back
+    speed_change=lambda item: SpeedChange("horizontal", x if (x := item.params[1]) > 0 else None),
 )
 """Items with a place are taken in frames 0, 3, 5, 6; all others in frame 2, and only there."""
 

@@ -1,14 +1,11 @@
-"""Fences from files: QGroundControl's `.plan`, and the polygons that KML, KMZ and GeoJSON draw.
+"""Fences from files: QGroundControl's `.plan`, and the polygons that KML and GeoJSON draw.
 
 A drawn polygon is a zone to stay in or out of, as words tell. Nobody is let fly into a zone for
 want of a word: a polygon whose words tell neither, or both, is an error that says how to tell.
 Sources: OGC KML 2.3 (07-147r2), Polygon, ExtendedData; RFC 7946.
 """
 
-import io
 import re
-import zipfile
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +15,7 @@ from xml.parsers import expat
 import shapely
 
 from faao_mav.errors import InputError, MissionFileError, quote, shortened
-from faao_mav.files import read_bytes, read_text
+from faao_mav.files import read_bytes, read_text, table
 from faao_mav.mission.fence import Fence, LatLon, Polygon, check_outlines
 from faao_mav.mission.formats import naming, read_mission
 from faao_mav.mission.formats.json_value import Json
@@ -26,26 +23,18 @@ from faao_mav.mission.formats.json_value import Json
 MAX_BYTES = 4_000_000
 """Bytes of the largest file that is read; chosen: far more than any autopilot stores."""
 
-_NOT_DENIED = r"(?<!\bnot )(?<!\bnon )(?<!\bun )\b"
 
-_OUT = re.compile(
-    _NOT_DENIED + r"(exclusions?|excluded?|exclusive(?! use)|no ?fly\w*|nfz\d*|no ?go|keep ?out|"
-    r"stay ?out|restricted|prohibited|forbidden|danger|no (entry|drones?|flying|flights?)|"
-    r"do not (fly|enter)|not (allowed|permitted))\b"
-)
-"""Whole words of a zone to stay out of, in lower case, parted by one space each."""
+def _words(kind: str) -> re.Pattern[str]:
+    """Return what finds the words of one kind in `fence_words.tsv`: lower case, one space apart."""
+    words = "|".join(
+        row["words"] for row in table("mission/fence_words.tsv") if row["kind"] == kind
+    )
+    return re.compile(rf"(?<!\bnot )(?<!\bnon )(?<!\bun )\b({words})\b")
 
-_IN = re.compile(
-    _NOT_DENIED + r"(inclusions?|included?|inclusive|keep ?in|stay ?in|unrestricted|allowed|"
-    r"permitted|exclusive use)\b"
-)
-"""Whole words of a zone to stay in that contradict those of `_OUT`."""
 
-_FIELD = re.compile(
-    r"\b(field|fence|geofence|(flight|flying|operati\w+|mission|working) (area|zone|volume|site))\b"
-)
-"""Whole words of a zone to stay in, where none of `_OUT` says what kind of one it is: "restricted
-field", "exclusion fence"."""
+_OUT, _IN, _FIELD = map(_words, ("out", "in", "field"))
+"""Zones to stay out of; words of others, which contradict those; and what is one to stay in where
+none of the first says more: "restricted field", "exclusion fence"."""
 
 _TRUTH = dict.fromkeys(("true", "1", "yes"), True) | dict.fromkeys(("false", "0", "no"), False)
 """What words of a property say, in lower case."""
@@ -79,14 +68,14 @@ def read_fence(path: Path) -> Fence:
     match path.suffix.lower():
         case ".plan":
             fence = read_mission(path).fence
-        case ".kml" | ".kmz":
+        case ".kml":
             content = read_bytes(path, MAX_BYTES, "a fence", MissionFileError)
             fence = naming(path, lambda: kml_fence(content))
         case ".geojson" | ".json":
             text = read_text(path, MAX_BYTES, "a fence", MissionFileError)
             fence = naming(path, lambda: geojson_fence(text))
         case suffix:
-            expected = "expected a .plan, .kml, .kmz or .geojson file"
+            expected = "expected a .plan, .kml or .geojson file; a .kmz is a .kml in a ZIP archive"
             raise MissionFileError(f"{path}: {suffix or 'no ending'}; {expected}")
     if not fence:
         raise MissionFileError(f"{path}: holds no fence; expected polygons")
@@ -124,13 +113,12 @@ def _of_geojson(
 
 
 def kml_fence(content: bytes) -> Fence:
-    """Return the fence that a KML file draws, or a KMZ archive that holds one.
+    """Return the fence that a KML file draws.
 
     The polygons of a placemark are one zone; its name, description and ExtendedData, and the names
     of the folders around it, say which kind.
     """
-    zipped = content.startswith(b"PK\x03\x04")
-    return fence_of(_of_kml(xml_tree(_unzipped(content) if zipped else content), ()))
+    return fence_of(_of_kml(xml_tree(content), ()))
 
 
 def _of_kml(element: Xml.Element, around: tuple[str, ...]) -> Iterator[DrawnZone]:
@@ -153,22 +141,6 @@ def _of_kml(element: Xml.Element, around: tuple[str, ...]) -> Iterator[DrawnZone
         parts.append([[corner.split(",") for corner in corners] for corners in texts])
     if parts:
         yield DrawnZone(place, name, properties, around, parts)
-
-
-def _unzipped(content: bytes) -> bytes:
-    try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            names = [name for name in archive.namelist() if name.casefold().endswith(".kml")]
-            if not names:
-                raise MissionFileError("an archive without a .kml file")
-            with archive.open(names[0]) as file:
-                kml = file.read(MAX_BYTES + 1)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        told = shortened(str(error))
-        raise MissionFileError(f"not a KMZ archive that can be read: {told}") from None
-    if len(kml) > MAX_BYTES:
-        raise MissionFileError(f"{quote(names[0])} in it is larger than {MAX_BYTES:,} bytes")
-    return kml
 
 
 def xml_tree(content: bytes) -> Xml.Element:

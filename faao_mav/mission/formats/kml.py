@@ -70,10 +70,8 @@ def kml_losses(mission: Mission, _: object) -> Iterator[str]:
     yield from left_out(mission, "KML")
     yield "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back"
     frames = {item.frame for item in mission.items}
-    if _ground(mission) is None and frames & ABOVE_HOME:
-        yield "no height of home is known: heights above home are drawn above the ground"
-    if frames & ABOVE_TERRAIN:
-        yield "heights above terrain are drawn above Google Earth's own"
+    if frames & ABOVE_TERRAIN or (_ground(mission) is None and frames & ABOVE_HOME):
+        yield "heights above terrain, or above a home without a height, are drawn above the ground"
     if any(item.command == Command.NAV_SPLINE_WAYPOINT for item in mission.items):
         yield "spline waypoints are joined by straight lines"
 
