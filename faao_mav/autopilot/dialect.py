@@ -98,7 +98,8 @@ _WORDS = {"all": ALL, "nothing": _NOTHING, "unknown": UNKNOWN}
 def commands_of(vehicle: str) -> tuple[dict[int, Codecs], dict[int, Codecs]]:
     """Return the commands that `vehicle` takes with a place, and those without one.
 
-    They are those of `commands.tsv`, with what is stored of param1 to param4.
+    They are those of `commands.tsv`, with what is stored of param1 to param4. What an ArduPilot of
+    a kind stores and passes over is told there too, and the bits of ARMING_MIS_ITEMS.
     """
     taken: dict[str, dict[int, Codecs]] = {"place": {}, "no place": {}}
     for row in table("autopilot/commands.tsv"):

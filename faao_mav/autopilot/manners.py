@@ -78,6 +78,12 @@ class Manners:
     meanings: Mapping[str, str] = field(default_factory=dict)
 
 
+def meanings_of(autopilot: str) -> dict[str, str]:
+    """Return what the table `meanings.tsv` says of the results of an `autopilot`."""
+    told = (row for row in table("autopilot/meanings.tsv") if row["autopilot"] == autopilot)
+    return {row["result"]: row["means"] for row in told}
+
+
 _LEAST_TIMEOUT = 0.5
 """Seconds for which an autopilot has to do without setpoints at least; chosen: the slowest come
 four times a second, irregularly."""

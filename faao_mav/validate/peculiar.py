@@ -6,29 +6,22 @@ from itertools import pairwise
 
 from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF
+from faao_mav.files import table
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import HOME, NAV_LAST, Straight, ValidationContext, at_zero
 from faao_mav.validate.rule import Hits, bound, checks, hit
 
 _SKIPPED = {
-    "copter": (30, 83, 191, 194, 210, 212, 223, 3000),
-    "plane": (
-        *(Command.NAV_VTOL_LAND, Command.NAV_GUIDED_ENABLE, Command.NAV_DELAY),
-        *(Command.CONDITION_YAW, 213, 222, 3000, 42600),
-    ),
+    kind: {
+        int(row["command"]) for row in table("autopilot/commands.tsv") if kind in row["skipped by"]
+    }
+    for kind in ("copter", "plane")
 }
-"""Commands that each type of vehicle stores and then passes over."""
-
 _REQUIRED = {
-    1: Command.NAV_LAND,
-    2: Command.NAV_VTOL_LAND,
-    4: Command.DO_LAND_START,
-    8: Command.NAV_TAKEOFF,
-    16: Command.NAV_VTOL_TAKEOFF,
-    64: Command.NAV_RETURN_TO_LAUNCH,
+    int(row["arming"]): Command(int(row["command"]))
+    for row in sorted(table("autopilot/commands.tsv"), key=lambda row: int(row["arming"] or 0))
+    if row["arming"]
 }
-"""The items that bits of ARMING_MIS_ITEMS ask for."""
-
 _RALLY_BIT = 32  # The bit of ARMING_MIS_ITEMS that asks for a rally point.
 
 _TAKEOFFS = {"copter": TAKEOFFS, "plane": {Command.NAV_TAKEOFF}}

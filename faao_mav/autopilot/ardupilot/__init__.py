@@ -19,7 +19,7 @@ from faao_mav.autopilot.dialect import (
     int16,
     uint8,
 )
-from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules
+from faao_mav.autopilot.manners import FenceAction, Manners, SetpointRules, meanings_of
 from faao_mav.autopilot.parameter import ParameterValues
 from faao_mav.autopilot.vehicle_type import AutopilotFamily, FenceResponse, RallyRule, VehicleType
 from faao_mav.geodesy import LocalFrame
@@ -69,18 +69,7 @@ ARDUPILOT = AutopilotFamily(
         request_period=1.0,
         patience=8.0,
         any_request_order=True,
-        meanings={
-            "ERROR": (
-                "no transfer under way, an item beyond the list, or a change of the mission that "
-                "it is flying"
-            ),
-            "INVALID": "command 0 or 1",
-            "UNSUPPORTED": (
-                "a command that this vehicle does not know, or fence and rally points over "
-                "MAVLink 1"
-            ),
-            "DENIED": "another ground station is uploading",
-        },
+        meanings=meanings_of("ardupilot"),
     ),
     setpoints=SetpointRules(
         "GUID_TIMEOUT",

@@ -23,6 +23,7 @@ from faao_mav.autopilot.manners import (
     Modes,
     SetpointRules,
     failsafes,
+    meanings_of,
 )
 from faao_mav.autopilot.parameter import ParameterValues, Recommended, parameters_of, table
 from faao_mav.autopilot.px4.flight_model import Px4 as Px4
@@ -59,13 +60,7 @@ PX4 = AutopilotFamily(
         patience=5.0,
         ignores_other_items=True,
         final_acks=2,  # until it hears one, nobody else can begin a transfer for 5 s
-        meanings={
-            "ERROR": (
-                "busy with another transfer, storage failed, a fence polygon of fewer than 3 "
-                "vertices, or fence items in a mission"
-            ),
-            "INVALID": "this kind of list is unknown to it",
-        },
+        meanings=meanings_of("px4"),
     ),
     has_submodes=True,
     setpoints=SetpointRules(
