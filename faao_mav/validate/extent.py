@@ -61,9 +61,12 @@ def _distances(context: ValidationContext) -> Hits:
     home, hovers = context.mission.home, context.vehicle.type.hovers
     farthest = 1000 * (bound.farthest_copter if hovers else bound.farthest_plane)
     for place in context.places if home is not None else ():
-        away = place.from_origin
-        if away > farthest:
-            yield hit("too-far", place.index, away=away / 1000)
+        away, item = place.from_origin, context.items[place.index]
+        if home is not None and away > farthest:
+            swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < bound.swapped
+            slip = "latitude and longitude look exchanged: correct them"
+            told = {"away": away / 1000, "slip": slip if swapped else "correct it"}
+            yield hit("too-far", place.index, **told)
         elif context.limits.max_distance is None and away > 1000 * bound.far:
             yield hit("far-from-home", place.index, away=away / 1000)
     for leg in context.legs:

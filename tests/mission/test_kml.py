@@ -74,6 +74,6 @@ def test_what_kml_cannot_hold_is_told() -> None:
     mission = Mission((nan, *MISSION.items), HOME, Fence(circles=(Circle((0.0, 0.0), 1.0, True),)))
     assert render_files(mission, "x.kml").lost == (
         "KML holds route and fence alone: no commands, speeds or holds, and cannot be read back",
-        "heights above terrain are drawn above Google Earth's own",
+        "heights above terrain, or above a home without a height, are drawn above the ground",
         "spline waypoints are joined by straight lines",
     )
