@@ -9,7 +9,6 @@ is the spread that is left.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -23,9 +22,6 @@ TERMS = 3
 
 SPREAD_OF_NO_LAW = 10.0
 """The spread, dB, beyond which no law of place is said to hold: twice that of open country."""
-
-_PAPER = (False, 0)
-"""The law d^-2 of the paper: its exponent is given, it has no terms of the elevation."""
 
 _ROBUST, _TURNS = 2.5, 8
 """Residuals beyond so many of their spreads count by their size, not its square (Huber); how often
@@ -44,7 +40,7 @@ _PACE = 1.0
 _APART = 10.0
 """Metres between heights that are left out one by one. Chosen: twice what a copter holds."""
 
-_SINES, _SWING = np.linspace(0.0, 1.0, 101)[:, None], 40.0
+_SINES, _POWERS, _SWING = np.linspace(0.0, 1.0, 101)[:, None], np.arange(1, TERMS + 1), 40.0
 """Sines from the horizon to the zenith, and dB by which the terms of the elevation may differ
 between them. Chosen: deeper nulls of antennas are no polynomial's, and beyond what was flown one
 may do anything."""
@@ -85,14 +81,12 @@ class Samples:
         That is against fast fading. In flight is above half the median height; what is not finite
         is left out.
         """
-        up = self.place[:, 2]
-        sound = np.isfinite(self.t) & np.isfinite(self.level) & np.isfinite(self.place).all(axis=1)
-        sound &= up > 0.0
-        sound &= up > (0.5 * np.median(up[sound]) if sound.any() else 0.0)
-        rows = np.column_stack([self.t, self.place, 10.0 ** (self.level / 10.0)])[sound]
+        rows = np.column_stack([self.t, self.place, self.level])
+        rows = rows[np.isfinite(rows).all(axis=1) & (self.place[:, 2] > 0.0)]
+        rows = rows[rows[:, 3] > (0.5 * np.median(rows[:, 3]) if len(rows) else 0.0)]
+        rows[:, 4] = 10.0 ** (rows[:, 4] / 10.0)
         group = np.unique(np.floor(rows[:, 0] / seconds), return_inverse=True)[1]
-        sums = np.stack([np.bincount(group, x) for x in rows.T], axis=1)
-        t, *place, power = (sums / np.bincount(group)[:, None]).T
+        t, *place, power = (np.bincount(group, x) / np.bincount(group) for x in rows.T)
         return Samples(t, np.stack(place, axis=1), 10.0 * np.log10(power), self.source)
 
 
@@ -189,52 +183,50 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     means = tuple(flight.means(seconds) for flight in flights)
     place = np.concatenate([each.place for each in means])
     level = np.concatenate([each.level for each in means])
-    source = ", ".join(each.source for each in means)
-    if len(level) < _LEAST:
-        text = f"{len(level)} means over {seconds:g} s in flight; expected at least {_LEAST}"
-        raise InputError(f"{source}: {text}")
+    source, counts = ", ".join(each.source for each in means), [len(each.t) for each in means]
+    if len(level) < _LEAST or not all(counts):
+        text = f"{', '.join(map(str, counts))} means over {seconds:g} s in flight"
+        raise InputError(f"{source}: {text}; expected at least {_LEAST}, and some of each")
     if np.ptp(place, axis=0).max() < 1.0:
         raise InputError(f"{source}: one place alone; expected a flight")
     legs = legs_of(means)
     heights = _heights(place[:, 2], legs)
     parts = [part for part in (legs, heights) if part.max() > 0]
-
-    def fitted(free: bool, terms: int) -> tuple[Real, Real, Real, list[float]]:
-        """Return A, y and c of a law, and its rms errors, dB, at what is left out."""
-        A, y = _linear(place, level, free, terms)
-        (c,) = _robust(A, y, np.ones((1, len(y)), dtype=np.bool_))
+    d, every = np.linalg.norm(place, axis=1), np.ones((1, len(level)), dtype=np.bool_)
+    slope, s = -10.0 * np.log10(d), place[:, 2] / d
+    columns = np.stack([np.ones_like(d), slope, *(s**k for k in _POWERS)], axis=1)
+    y = level - 2.0 * slope  # that level, n - 2 and terms are to tell, a column each
+    laws = [[0, *free, *range(2, 2 + terms)] for free in ([], [1]) for terms in range(TERMS + 1)]
+    fits = []
+    for law in sorted(laws, key=len) if parts else [[0]]:  # of one leg none can be left out
+        A, c = columns[:, law], np.zeros(columns.shape[1])
+        c[law] = _robust(A, y, every)[0]
         told = [np.sum(A * _without(A, y, part)[part], axis=1) for part in parts]
-        return A, y, c, [_rms(y - each) for each in told or [A @ c]]
-
-    laws = sorted(product((False, True), range(TERMS + 1)), key=sum) if parts else [_PAPER]
-    tried, best = {law: fitted(*law) for law in laws}, _PAPER
-    for (free, terms), (_, _, c, spread) in tried.items():
-        pays = np.mean(spread) < (1.0 - _PAYS) * np.mean(tried[best][-1])
-        if pays and np.ptp(_SINES ** np.arange(1, terms + 1) @ c[len(c) - terms :]) <= _SWING:
-            best = free, terms
-    (free, terms), (A, y, c, spread) = best, tried[best]
-    error, error_of_gain = _jackknife(A, y, legs)
+        fits.append((law, c, [_rms(y - each) for each in told or [columns @ c]]))
+    law, c, spread = fits[0]
+    for more, tried, left in fits:
+        pays = np.mean(left) < (1.0 - _PAYS) * np.mean(spread)
+        if pays and np.ptp(_SINES**_POWERS @ tried[2:]) <= _SWING:
+            law, c, spread = more, tried, left
+    count, away = int(legs.max()) + 1, np.full((1, 1), math.inf)
+    if count > 1:
+        without = _without(columns[:, law], y, legs)
+        away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))  # the jackknife
+    errors, used = np.zeros_like(c), max(law[-1], 1) + 1
+    errors[law] = np.linalg.norm(away, axis=0)
     return LinkFit(
         level=float(c[0]),
-        exponent=float(c[1]) if free else 2.0,
-        elevation=tuple(c[len(c) - terms :].tolist()),
-        errors=(error[0], error[1] if free else 0.0, *error[len(c) - terms :]),
-        error=error_of_gain,
+        exponent=2.0 + float(c[1]),
+        elevation=tuple(c[2:used].tolist()),
+        errors=tuple(errors[:used].tolist()),
+        error=_rms(np.linalg.norm(columns[:, law] @ away.T, axis=1)),
         spread=spread[-1],
-        paper_spread=tried[_PAPER][-1][-1],
-        correlation=_correlation(means, y - A @ c),
-        legs=int(legs.max()) + 1,
+        paper_spread=fits[0][2][-1],
+        correlation=_correlation(means, y - columns @ c),
+        legs=count,
         heights=int(heights.max()) + 1,
         flights=means,
     )
-
-
-def _linear(place: Real, level: Real, free: bool, terms: int) -> tuple[Real, Real]:
-    """Return A (k, m) and y (k,) of the law's least squares y = A c: level, exponent, terms."""
-    d = np.linalg.norm(place, axis=-1)
-    slope, s = -10.0 * np.log10(d), place[:, 2] / d
-    columns = [np.ones_like(d), *([slope] if free else []), *(s**k for k in range(1, terms + 1))]
-    return np.stack(columns, axis=1), level if free else level - 2.0 * slope
 
 
 def _robust(A: Real, y: Real, kept: Flags) -> Real:
@@ -242,11 +234,9 @@ def _robust(A: Real, y: Real, kept: Flags) -> Real:
 
     By Huber's measure: least squares, reweighted in turn.
     """
-    products = (A[:, :, None] * A[:, None]).reshape(len(A), -1)
     weight = kept.astype(np.float64)
     for _ in range(_TURNS):
-        normal = (weight @ products).reshape(-1, A.shape[1], A.shape[1])
-        inverse = np.linalg.pinv(normal, rcond=_DEPENDENT, hermitian=True)
+        inverse = np.linalg.pinv((weight[:, None] * A.T) @ A, rcond=_DEPENDENT, hermitian=True)
         c = (inverse @ ((weight * y) @ A)[:, :, None])[:, :, 0]
         away = np.abs(y - c @ A.T)
         middle = np.nanmedian(np.where(kept, away, np.nan), axis=1, keepdims=True)
@@ -258,16 +248,6 @@ def _robust(A: Real, y: Real, kept: Flags) -> Real:
 def _without(A: Real, y: Real, part: Integers) -> Real:
     """Return the c (p, m) of fits from which each `part` (k,) in turn is left out."""
     return _robust(A, y, part != np.arange(part.max() + 1)[:, None])
-
-
-def _jackknife(A: Real, y: Real, legs: Integers) -> tuple[list[float], float]:
-    """Return the standard errors of c and of A c by leaving out legs; infinite of one leg."""
-    count = int(legs.max()) + 1
-    if count == 1:
-        return [math.inf] * A.shape[1], math.inf
-    without = _without(A, y, legs)
-    away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
-    return np.linalg.norm(away, axis=0).tolist(), _rms(np.linalg.norm(A @ away.T, axis=1))
 
 
 def legs_of(means: Sequence[Samples]) -> Integers:
@@ -303,16 +283,15 @@ def _heights(up: Real, legs: Integers) -> Integers:
 
 def _correlation(means: Sequence[Samples], residual: Real) -> float:
     """Return the L, m, for which exp(-distance/L) is nearest to the residuals' correlation."""
+    from scipy.spatial.distance import pdist
+
     total, pairs = np.zeros((2, len(_LAGS) - 1))
     ends = np.cumsum([len(flight.t) for flight in means])
     for flight, rest in zip(means, np.split(residual, ends[:-1]), strict=True):
         every = -(-len(rest) // _MOST_PAIRED)
-        place, rest = flight.place[::every], rest[::every]
-        for k in range(1, len(rest)):
-            lag = np.digitize(np.linalg.norm(place[k:] - place[:-k], axis=-1), _LAGS) - 1
-            near = lag < len(pairs)
-            total += np.bincount(lag[near], (rest[k:] * rest[:-k])[near], len(pairs))
-            pairs += np.bincount(lag[near], minlength=len(pairs))
+        away, (i, k) = pdist(flight.place[::every]), np.triu_indices(-(-len(rest) // every), 1)
+        total += np.histogram(away, _LAGS, weights=rest[::every][i] * rest[::every][k])[0]
+        pairs += np.histogram(away, _LAGS)[0]
     power = float(np.mean(residual**2))
     if power == 0.0:
         return 0.0
