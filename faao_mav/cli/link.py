@@ -15,7 +15,7 @@ from faao_mav.files import check_ending, read_text, write_together, write_whole
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
-    from faao_mav.radio.measured import Calibration
+    from faao_mav.radio.measured import Calibration, Measured
     from faao_mav.report.link import LinkReport
 
 
@@ -59,7 +59,8 @@ class _Measured:
 
     def gains(self, path: Path, station: Sequence[float]) -> "Iterator[Samples]":
         """Yield the gain, dB, in each flight of a table or log; without power within a constant."""
-        for samples, unit in self._flights(path, station):
+        for found in self._flights(path, station):
+            samples, unit = found.samples, found.unit
             if unit == "mbit/s":
                 samples, unit = self._by_rates(path, samples), "db"
             if unit == "db" and (self.power is None) != (self.noise is None):
@@ -67,29 +68,28 @@ class _Measured:
             floor = self.noise or 0.0 if unit == "db" else 0.0
             yield replace(samples, level=samples.level + floor - (self.power or 0.0))
 
-    def _flights(self, path: Path, station: Sequence[float]) -> Iterator[tuple["Samples", str]]:
-        """Yield the flights in a table or log, and the unit of what was measured."""
+    def _flights(self, path: Path, station: Sequence[float]) -> "Iterator[Measured]":
+        """Yield what was measured in the flights of a table or log."""
         import numpy as np
 
         from faao_mav.fly.logs import read_log
-        from faao_mav.radio.measured import level_of, read_measured, samples_at
+        from faao_mav.radio.measured import measured_in, read_measured
 
-        units, calibration = self.units, self.calibration
+        given = station, self.units, self.calibration
         if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
-            found = read_measured(path, station, units, calibration)
+            found = read_measured(path, *given)
             if found.left_out:
                 cli.note(f"{path}: {found.left_out} rows without a number are left out")
-            yield found.samples, found.unit
+            yield found
             return
         told = [record for record in read_log(path) if np.isfinite(record.rssi).any()]
         if not told:
             raise InputError(f"{path}: no radio tells a level in it; expected RADIO_STATUS or RAD")
-        for record in told:
-            known = np.isfinite(record.rssi)
-            level, unit = level_of(path, record.rssi[known], units.get("rssi", "raw"), calibration)
-            t, up = record.t[known], (record.altitude - record.home)[known]
-            at = t, record.latitude[known], record.longitude[known], up
-            yield samples_at(path, station, at, level), unit
+        for each in told:
+            up = each.altitude - each.home
+            rows = np.column_stack([each.t, each.latitude, each.longitude, up, each.rssi])
+            header = ["time_s", "latitude", "longitude", "altitude_m", "rssi_raw"]
+            yield measured_in(path, header, rows.tolist(), *given)
 
     def _by_rates(self, path: Path, samples: "Samples") -> "Samples":
         """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.

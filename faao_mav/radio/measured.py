@@ -99,34 +99,57 @@ def read_measured(
         text = f"--unit {min(unknown)}: no such column; give one of {', '.join(_COLUMNS)}"
         raise InputError(text)
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
-    lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
-    header = next(lines, "")
-    delimiter = max(";\t,", key=header.count)
-    names = next(csv.reader([header], delimiter=delimiter), [])
-    columns, unit_of = _columns(path, names, units)
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    between = max(";\t,", key="".join(lines[:1]).count)
+    if between == ";":
+        lines[1:] = [line.replace(",", ".") for line in lines[1:]]
+    rows = csv.reader(lines, delimiter=between)
     try:
-        rows = _numbers(csv.reader(lines, delimiter=delimiter), columns, comma=delimiter == ";")
+        return measured_in(path, next(rows, []), rows, station, units, calibration)
     except csv.Error as error:
         raise InputError(f"{path}: {error}; expected rows of numbers") from None
-    level = next(name for name in columns if name in _LEVELS)
-    sound = np.isfinite(rows).all(axis=1)
+
+
+def measured_in(
+    path: Path,
+    header: Sequence[str],
+    rows: Iterable[Sequence[str | float]],
+    station: Sequence[float],
+    units: Mapping[str, str],
+    calibration: Calibration,
+) -> Measured:
+    """Return the flight in `rows` under a `header`, of the log `path`; see `read_measured`."""
+    columns, unit_of = _columns(path, header, units)
+    numbers = [[_number(row, k, name) for name, k in columns.items()] for row in rows]
+    found = np.array(numbers, dtype=np.float64).reshape(-1, len(columns))
+    sound = np.isfinite(found).all(axis=1)
     if not sound.any():
         raise InputError(f"{path}: no row with {', '.join(columns)}; expected the rows of a flight")
-    kept = {
-        name: values * _COLUMNS[name][1][unit_of[name]]
-        for name, values in zip(columns, rows[sound].T, strict=True)
-    }
-    told, unit = level_of(path, kept[level], unit_of[level], calibration)
-    samples = samples_at(path, station, [kept[name] for name in _PLACES], told)
+    scales = [_COLUMNS[name][1][unit_of[name]] for name in columns]
+    kept = dict(zip(columns, (found[sound] * scales).T, strict=True))
+    t, latitude, longitude, altitude = (kept.pop(name) for name in _PLACES)
+    ((name, told),) = kept.items()
+    level, unit = _level(path, told, unit_of[name], calibration)
+    if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
+        raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
+    local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
+    away = float(np.median(np.hypot(*local.T)))
+    if not away < _FARTHEST:
+        raise InputError(
+            f"{path}: {away / 1000:,.0f} km from --station {station[0]:g},{station[1]:g}; expected "
+            "a flight about it: are latitude and longitude exchanged?"
+        )
+    order = np.argsort(t, kind="stable")
+    place = np.column_stack([local, altitude - station[2]])
+    samples = Samples(t[order], place[order], level[order], path.name)
     return Measured(samples, unit, int(np.sum(~sound)))
 
 
-def level_of(path: Path, told: Real, unit: str, calibration: Calibration = ()) -> tuple[Real, str]:
+def _level(path: Path, told: Real, unit: str, calibration: Calibration) -> tuple[Real, str]:
     """Return levels `told` (k,) in `unit` as those of a `Measured`, and their unit.
 
     Counts are linear in dBm through the points of the `calibration`; with one point, or none, they
-    have the steps, or all, of SiK radios. Raises `InputError` for levels that are none in that
-    unit, and where counts would need another calibration.
+    have the steps, or all, of SiK radios.
     """
     if unit in ("sik", "raw"):
         if unit == "raw" and len(calibration) < 2:
@@ -148,28 +171,8 @@ def level_of(path: Path, told: Real, unit: str, calibration: Calibration = ()) -
     return told, unit
 
 
-def samples_at(path: Path, station: Sequence[float], at: Sequence[Real], level: Real) -> Samples:
-    """Return levels (k,) of the log `path` as `Samples`; see `read_measured`.
-
-    `at` are their times, s, latitudes and longitudes, degrees, and altitudes, m, each (k,).
-    """
-    t, latitude, longitude, altitude = at
-    if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
-        raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
-    local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
-    away = float(np.median(np.hypot(*local.T)))
-    if not away < _FARTHEST:
-        raise InputError(
-            f"{path}: {away / 1000:,.0f} km from --station {station[0]:g},{station[1]:g}; expected "
-            "a flight about it: are latitude and longitude exchanged?"
-        )
-    order = np.argsort(t, kind="stable")
-    place = np.column_stack([local, altitude - station[2]])
-    return Samples(t[order], place[order], level[order], path.name)
-
-
 def _columns(
-    path: Path, header: list[str], units: Mapping[str, str]
+    path: Path, header: Sequence[str], units: Mapping[str, str]
 ) -> tuple[dict[str, int], dict[str, str]]:
     """Return by quantity the number of its column in `header`, and its unit."""
     columns, unit_of = dict[str, int](), dict[str, str]()
@@ -197,16 +200,11 @@ def _columns(
     return columns, unit_of
 
 
-def _numbers(rows: Iterable[list[str]], columns: Mapping[str, int], *, comma: bool) -> Real:
-    """Return the numbers of those columns, (k, len(columns)), NaN for what is none."""
-
-    def number(row: list[str], name: str) -> float:
-        text = row[columns[name]].strip() if columns[name] < len(row) else ""
-        with suppress(ValueError):
-            return float(text.replace(",", ".") if comma else text)
-        with suppress(ValueError):
-            return datetime.fromisoformat(text).timestamp() if name == "time" else math.nan
-        return math.nan
-
-    found = [[number(row, name) for name in columns] for row in rows]
-    return np.array(found, dtype=np.float64).reshape(-1, len(columns))
+def _number(row: Sequence[str | float], column: int, name: str) -> float:
+    """Return the number of that column, a quantity; NaN for what is none."""
+    with suppress(ValueError, IndexError):
+        return float(row[column])
+    with suppress(ValueError, IndexError):
+        if name == "time":
+            return datetime.fromisoformat(str(row[column]).strip()).timestamp()
+    return math.nan
