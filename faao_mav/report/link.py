@@ -13,7 +13,7 @@ from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, seen
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.kriging import kriged
 from faao_mav.radio.terrain import free_space_db
-from faao_mav.report.style import INK, SERIES, WIDTH, colour_bar, drawing, label, legend_above
+from faao_mav.report import style
 from faao_mav.report.summary import Line
 
 if TYPE_CHECKING:
@@ -168,56 +168,48 @@ def _rests_on(fit: LinkFit) -> str:
 
 def link_page(fit: LinkFit, report: LinkReport) -> str:
     """Return the page about a fit: its report, measured against fitted, and residuals on a map."""
+    from matplotlib.ticker import LogLocator
+
     from faao_mav.report.page import facts, figure_section, page, section
 
     every = -(-fit.count // _MOST_SHOWN)
     place = fit.place[::every]
     measured = np.concatenate([flight.level for flight in fit.flights])[::every]
-    law = fit.gain_db(place)
-    away, up = seen(place)
-    distance = _scatter(away, measured, law, "distance from the station, m", log=True)
-    elevation = _scatter(up, measured, law, "elevation, degrees")
-    over = "Measured and fitted gain over the"
-    seen_at = f"{over} elevation at which the station sees the UAV"
+    law, (away, up) = fit.gain_db(place), seen(place)
+    sections = [section("Link", facts(report.lines), "wide")]
+    for name, x, over, title in (
+        ("distance", away, "distance from the station, m", "distance from the station's antenna"),
+        ("elevation", up, "elevation, degrees", "elevation at which the station sees the UAV"),
+    ):
+        with style.drawing(style.WIDTH, 3.2) as figure:
+            plot = figure.subplots()
+            dots: Any = {"linestyle": "none", "marker": ".", "markersize": 2.5}
+            plot.plot(x, measured, color=style.SERIES[0], alpha=0.4, label="measured", **dots)
+            plot.plot(x, law, color=style.SERIES[1], label="fitted", **dots)
+            if name == "distance":
+                plot.set_xscale("log")
+                plot.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+                plot.xaxis.set_major_formatter("{x:g}")
+                plot.minorticks_off()
+            style.label(plot, "", over, "gain, dB")
+            style.legend_above(plot)
+        title = f"Measured and fitted gain over the {title}"
+        sections.append(figure_section(f"Over {name}", figure, title))
     left = "Measured over fitted gain, dB, where it was flown, metres east and north of the station"
-    sections = [
-        section("Link", facts(report.lines), "wide"),
-        figure_section("Over distance", distance, f"{over} distance from the station's antenna"),
-        figure_section("Over elevation", elevation, seen_at),
-        figure_section("Left by the law", _map(place, measured - law), left),
-    ]
+    sections.append(figure_section("Left by the law", _map(place, measured - law), left))
     return page("The link as it was measured", "\n".join(sections))
-
-
-def _scatter(x: Real, measured: Real, law: Real, over: str, *, log: bool = False) -> "Figure":
-    from matplotlib.ticker import LogLocator, NullLocator, StrMethodFormatter
-
-    with drawing(WIDTH, 3.2) as figure:
-        plot = figure.subplots()
-        plot.plot(x, measured, ".", color=SERIES[0], markersize=2.5, alpha=0.4, label="measured")
-        plot.plot(x, law, ".", color=SERIES[1], markersize=2.5, label="fitted")
-        if log:
-            plot.set_xscale("log")
-            plot.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            plot.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-            plot.xaxis.set_minor_locator(NullLocator())
-        label(plot, "", over, "gain, dB")
-        legend_above(plot)
-    return figure
 
 
 def _map(place: Real, residual: Real) -> "Figure":
     from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap
 
-    with drawing(WIDTH, 3.8) as figure:
+    with style.drawing(style.WIDTH, 3.8) as figure:
         plot = figure.subplots()
-        colours = ListedColormap(colormaps["coolwarm"](np.linspace(0.0, 1.0, _LEVELS)))
-        shown = plot.scatter(place[:, 0], place[:, 1], c=residual, s=6, cmap=colours)
+        colours = colormaps["coolwarm"].resampled(_LEVELS)
+        shown = plot.scatter(place[:, 0], place[:, 1], 6, residual, cmap=colours)
         shown.set_clim(-_SHOWN, _SHOWN)
-        plot.plot([0], [0], "s", color=INK, markersize=7)
-        plot.annotate("station", (0, 0), xytext=(7, 7), textcoords="offset points", color=INK)
         plot.set_aspect("equal", adjustable="datalim")
-        colour_bar(plot, shown, "measured over fitted, dB", 0.8)
-        label(plot, "", "east, m", "north, m")
+        style.colour_bar(plot, shown, "measured over fitted, dB", 0.8)
+        style.label(plot, "", "east, m", "north, m")
+        style.mark_stations(plot, [("station", np.zeros((1, 2)), "s")])
     return figure
