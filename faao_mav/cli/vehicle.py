@@ -225,21 +225,20 @@ def fly(
         **link,
     )
     ending, found = report.ending, telling.debriefing(report)
-    if as_json:
-        told = {
+    if ending is None and not as_json:
+        cli.note("the vehicle holds another mission than the file: upload it first")
+    cli.show(
+        lambda: {
             "ending": ending.kind if ending else "different",
             "text": ending.text if ending else "the vehicle holds another mission",
             "differences": [str(each) for each in report.differences],
             "findings": report.findings,
             "flight": debriefing_as_dict(found) if found else None,
-        }
-        typer.echo(json.dumps(cli.plain(told)))
-    elif lines := joined(flight_lines(report, found)):
-        typer.echo(lines)
-    if ending is None and not as_json:
-        cli.note("the vehicle holds another mission than the file: upload it first")
-    if ending is None or ending.kind != "finished":
-        raise typer.Exit(1)
+        },
+        lambda: [joined(flight_lines(report, found))],
+        as_json=as_json,
+        good=ending is not None and ending.kind == "finished",
+    )
 
 
 def debrief(

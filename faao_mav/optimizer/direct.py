@@ -32,7 +32,7 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
 from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, sparing_starts, starts
-from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, worth
+from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, under_shadowing
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.rate_steps import RateSteps
 
@@ -230,7 +230,7 @@ class _Search:
             found.append(problem.improved(stage, begin, *limits, warm=True))
 
         def value(w: Real) -> float:
-            return worth(problem, w, partial(field.value, w.T))
+            return under_shadowing(problem, w, partial(field.value, w.T)).worth
 
         return max(found, key=lambda each: value(each.trajectory.w))
 

@@ -151,6 +151,5 @@ def _worth(solution: Solution) -> float:
     if goal.maximise == "data":
         return solution.delivered_rate * plan.flight.duration
     if (under := shadowed(solution)) is not None:
-        reliability = plan.radio.reliability
-        return under.quantiles[round(1 - reliability, 9)] if reliability else under.mean
+        return under.worth
     return solution.maximised

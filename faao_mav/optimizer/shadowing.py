@@ -113,9 +113,11 @@ def arriving(problem: Problem, rates: Real, shares: Real | None = None) -> Real:
 class Shadowed:
     """What arrives under shadowing, bit/s/Hz: the mean, and quantiles by their probability.
 
-    `arrived` are the same quantiles after each slot (n,), sums in bits per slot and hertz.
+    `worth` is what the plan wants of them: the mean, or the quantile that `radio.reliability` asks
+    for. `arrived` are the quantiles after each slot (n,), sums in bits per slot and hertz.
     """
 
+    worth: float
     mean: float
     quantiles: Mapping[float, float]
     arrived: Mapping[float, Real]
@@ -123,26 +125,23 @@ class Shadowed:
 
 def shadowed(solution: Solution) -> Shadowed | None:
     """Return what arrives of a solution with its precoders; None where no spread is known."""
-    if not spread_known(solution.problem):
-        return None
-    found = outcomes(
-        solution.problem,
-        solution.w,
-        lambda db: np.array(solution.recomputed_slots(10 ** (db / 10))),
-    )
-    reliability = solution.plan.radio.reliability
-    told = sorted({0.1, 0.5, 0.9} | ({round(1 - reliability, 9)} if reliability else set()))
-    arrived = dict(zip(told, np.quantile(found, told, axis=0), strict=True))
-    n = len(solution.w)
-    quantiles = {part: float(sums[-1]) / n for part, sums in arrived.items()}
-    return Shadowed(float(found[:, -1].mean()) / n, quantiles, arrived)
+
+    def rates(db: float) -> Real:
+        return np.array(solution.recomputed_slots(10 ** (db / 10)))
+
+    problem = solution.problem
+    return under_shadowing(problem, solution.w, rates) if spread_known(problem) else None
 
 
-def worth(problem: Problem, w: Real, rates: Rates) -> float:
-    """Return what the plan wants of the `outcomes`: their mean, or `radio.reliability`'s part."""
-    reliability = problem.plan.radio.reliability
-    found = outcomes(problem, w, rates)[:, -1] / len(w)
-    return float(found.mean() if reliability is None else np.quantile(found, 1 - reliability))
+def under_shadowing(problem: Problem, w: Real, rates: Rates) -> Shadowed:
+    """Return what arrives at w (n, 2); see `outcomes`."""
+    found, reliability = outcomes(problem, w, rates), problem.plan.radio.reliability
+    asked = [] if reliability is None else [round(1 - reliability, 9)]
+    parts = sorted({0.1, 0.5, 0.9, *asked})
+    arrived = dict(zip(parts, np.quantile(found, parts, axis=0), strict=True))
+    quantiles = {part: float(sums[-1]) / len(w) for part, sums in arrived.items()}
+    mean = float(found[:, -1].mean()) / len(w)
+    return Shadowed(quantiles[asked[0]] if asked else mean, mean, quantiles, arrived)
 
 
 def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> Stage:

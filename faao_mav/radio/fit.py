@@ -45,6 +45,9 @@ _SINES, _POWERS, _SWING = np.linspace(0.0, 1.0, 101)[:, None], np.arange(1, TERM
 between them. Chosen: deeper nulls of antennas are no polynomial's, and beyond what was flown one
 may do anything."""
 
+_STEEPEST = 10.0
+"""The greatest exponent of a law, the least being 0: what a plan takes."""
+
 _PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
@@ -206,7 +209,11 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     law, c, spread = fits[0]
     for more, tried, left in fits:
         pays = np.mean(left) < (1.0 - _PAYS) * np.mean(spread)
-        if pays and np.ptp(_SINES**_POWERS @ tried[2:]) <= _SWING:
+        if (
+            pays
+            and 0.0 <= 2.0 + tried[1] <= _STEEPEST
+            and np.ptp(_SINES**_POWERS @ tried[2:]) <= _SWING
+        ):
             law, c, spread = more, tried, left
     count, away = int(legs.max()) + 1, np.full((1, 1), math.inf)
     if count > 1:

@@ -174,29 +174,24 @@ def _level(path: Path, told: Real, unit: str, calibration: Calibration) -> tuple
 def _columns(
     path: Path, header: Sequence[str], units: Mapping[str, str]
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Return by quantity the number of its column in `header`, and its unit."""
+    """Return by quantity its column in `header`, and its unit; of several levels the first."""
     columns, unit_of = dict[str, int](), dict[str, str]()
     for number, told in enumerate(header):
         words = re.findall(r"[^\s_()\[\],]+", told.lower())
         name = _CALLED.get(words[0]) if words else None
-        if name is not None and name not in columns:
-            columns[name] = number
-            unit_of[name] = units.get(name, "_".join(words[1:])).lower()
-    missing = [name for name in _PLACES if name not in columns]
-    levels = [name for name in columns if name in _LEVELS]
-    if missing or not levels:
-        missing += [] if levels else ["one of " + ", ".join(_LEVELS)]
-        raise InputError(f"{path}: line 1: no column of {', '.join(missing)} in {header}")
-    for name in levels[1:]:
-        del columns[name]
-    for name in columns:
-        _, known = _COLUMNS[name]
-        if unit_of[name] not in known:
-            had = f"unit {unit_of[name]!r}" if unit_of[name] else "no unit"
+        if name is None or not columns.keys().isdisjoint(_LEVELS if name in _LEVELS else [name]):
+            continue
+        unit, known = units.get(name, "_".join(words[1:])).lower(), _COLUMNS[name][1]
+        if unit not in known:
             raise InputError(
-                f"{path}: line 1: {header[columns[name]]!r} has {had}; name it in the header or "
-                f"give --unit {name}=UNIT, one of {', '.join(filter(None, known))}"
+                f"{path}: line 1: {told!r} has {f'unit {unit!r}' if unit else 'no unit'}; name it "
+                f"in the header or give --unit {name}=UNIT, one of {', '.join(filter(None, known))}"
             )
+        columns[name], unit_of[name] = number, unit
+    missing = [name for name in _PLACES if name not in columns]
+    missing += ["one of " + ", ".join(_LEVELS)] * columns.keys().isdisjoint(_LEVELS)
+    if missing:
+        raise InputError(f"{path}: line 1: no column of {', '.join(missing)} in {header}")
     return columns, unit_of
 
 

@@ -180,8 +180,8 @@ def _rates(result: Result) -> Iterator[Line]:
         told += f"shadowings, {arrives[0.5]:.4f} in half of them, {under.mean:.4f} in the mean"
         yield "shadowing", told
         if (kept := radio.reliability) is not None:
-            least = arrives[round(1 - kept, 9)]
-            yield "", f"planned for what arrives in {100 * kept:g} % of them: {least:.4f} bit/s/Hz"
+            told = f"planned for what arrives in {100 * kept:g} % of them"
+            yield "", f"{told}: {under.worth:.4f} bit/s/Hz"
     if information is not None:
         told = f"mutual information {information.average:.3f} +- {information.error:.1g}"
         yield "information", f"{told}, {information.delivered:.3f} delivered"

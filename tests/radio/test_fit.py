@@ -117,6 +117,8 @@ def test_no_elevation_spread_gives_no_terms_that_run_wild() -> None:
         swing = np.ptp(sum((c * s**k for k, c in enumerate(fit.elevation, 1)), 0.0 * s))
         assert swing <= 40.0
         assert off(fit, (-45.0, 2.0)) < 3.0
+    steep = replace(far, level=-0.1 * far.place[:, 0])  # as if another station had been heard
+    assert 0.0 <= fit_link([steep]).exponent <= 10.0
 
 
 def test_no_flight_is_refused() -> None:
