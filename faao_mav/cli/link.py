@@ -11,7 +11,7 @@ import typer
 
 import faao_mav.cli.shared as cli
 from faao_mav.errors import InputError
-from faao_mav.files import check_ending, read_text, write_together, write_whole
+from faao_mav.files import check_ending, read_text, write_together
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
@@ -75,9 +75,9 @@ class _Measured:
         from faao_mav.fly.logs import read_log
         from faao_mav.radio.measured import measured_in, read_measured
 
-        given = station, self.units, self.calibration
+        units, calibration = self.units, self.calibration
         if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
-            found = read_measured(path, *given)
+            found = read_measured(path, station, units, calibration)
             if found.left_out:
                 cli.note(f"{path}: {found.left_out} rows without a number are left out")
             yield found
@@ -85,11 +85,12 @@ class _Measured:
         told = [record for record in read_log(path) if np.isfinite(record.rssi).any()]
         if not told:
             raise InputError(f"{path}: no radio tells a level in it; expected RADIO_STATUS or RAD")
+        level = f"rssi_{units.get('rssi', 'raw')}"
+        header = ["time_s", "latitude", "longitude", "altitude_m", level]
         for each in told:
             up = each.altitude - each.home
             rows = np.column_stack([each.t, each.latitude, each.longitude, up, each.rssi])
-            header = ["time_s", "latitude", "longitude", "altitude_m", "rssi_raw"]
-            yield measured_in(path, header, rows.tolist(), *given)
+            yield measured_in(path, header, rows.tolist(), station, {}, calibration)
 
     def _by_rates(self, path: Path, samples: "Samples") -> "Samples":
         """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.
@@ -224,7 +225,7 @@ def link(
     from faao_mav.report.link import fitted, link_page
     from faao_mav.report.summary import joined
 
-    written: list[Path] = []
+    contents: dict[str | Path, bytes] = {}
     if over.terrain:
         found = over.report(place)
     else:
@@ -232,16 +233,14 @@ def link(
         fit = fit_link(flights, measured.mean)
         found = fitted(fit, measured.power is not None, place if map_file is not None else None)
         if report is not None:
-            write_whole(report, link_page(fit, found).encode())
-            written.append(report)
-    if out is not None and found.law:
-        law, contents = found.law, dict[str | Path, bytes]()
+            contents[report] = link_page(fit, found).encode()
+    if out is not None and (law := found.law):
         if found.above is not None and map_file is not None:
             contents[map_file] = map_archive(found.above)
             law += f"map: {json.dumps(os.path.relpath(map_file, out.parent))}\n"
         contents[out] = law.encode()
-        write_together(contents)
-        written = [*map(Path, reversed(contents)), *written]
+    write_together(contents)
+    written = [*reversed(contents)]
     cli.show(
         lambda: found.record | {"written": written},
         lambda: [joined([*found.lines, ("files", ", ".join(map(str, written)) or "none")])],
