@@ -24,8 +24,6 @@ The public names, which are imported when they are first used:
   `InfeasibleError`, `SolverError`, `LinkError`
 """
 
-import ast
-import pkgutil
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -93,15 +91,38 @@ if TYPE_CHECKING:
     from faao_mav.workflow import Result as Result
     from faao_mav.workflow import plan_mission as plan_mission
 
-
-def _homes() -> dict[str, str]:
-    """Return by public name the module that has it: what the imports above tell type checkers."""
-    text = pkgutil.get_data(__name__, "__init__.py")
-    found = [node for node in ast.walk(ast.parse(text or b"")) if isinstance(node, ast.ImportFrom)]
-    return {each.asname: node.module or "" for node in found for each in node.names if each.asname}
-
-
-_HOME = _homes()
+_HOMES = {
+    "autopilot": "Track Vehicle",
+    "autopilot.predict": "predict",
+    "errors": "FaaoError InfeasibleError InputError LinkError MissionFileError ParameterFileError "
+    "PlanError SolverError",
+    "fly.fly": "fly_mission",
+    "fly.logs": "read_log",
+    "fly.preflight": "Flight",
+    "mission": "Mission MissionItem",
+    "mission.formats": "read_mission render_mission",
+    "mission.formats.parameter_file": "read_parameters render_parameters",
+    "optimizer.optimize": "optimize",
+    "optimizer.pricing": "price saturation",
+    "optimizer.problem": "OwnParts Problem build_problem",
+    "optimizer.search.bound": "upper_bound",
+    "optimizer.solution": "Solution load_solution save_solution",
+    "plan": "Plan parse_plan read_plan",
+    "radio.fit": "LinkFit Samples fit_link",
+    "radio.gain": "GainFunction PathGain",
+    "radio.measured": "read_measured",
+    "radio.rate_steps": "StreamRate",
+    "report.debrief": "debrief",
+    "report.figures": "flight_figure route_figure",
+    "report.page": "render_report",
+    "report.style": "save_figure",
+    "schedule": "Conversion convert",
+    "study": "StudyRow as_array make_cases parse_vary run_study study_figure",
+    "validate": "Check Finding Limits LinkCheck check",
+    "wire": "download upload",
+    "workflow": "Result plan_mission",
+}
+_HOME = {name: home for home, names in _HOMES.items() for name in names.split()}
 
 __all__ = sorted(_HOME)
 
@@ -113,7 +134,7 @@ def __getattr__(name: str) -> Any:
 
         return version("faao-mav")
     if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
+        return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
