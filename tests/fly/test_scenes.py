@@ -19,14 +19,24 @@ modes, orders; `quiet`: nothing that moves it is sent from then on, `unmoved`: n
 is sent in any scene that its `Judge` calls wrong.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scenes import MODES, ORDERS, is_setpoint, staged
+from scenes import MODES, ORDERS, Scene, arms, is_setpoint, staged, starts
+from stations import FOREIGN, VEHICLE
 from trials import Trial, flown
+
+from faao_mav.wire.messages import (
+    CommandAck,
+    CommandLong,
+    Envelope,
+    MissionAck,
+    MissionRequestList,
+)
+from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MavResult, MissionType
 
 SCENES = Path(__file__).parents[1] / "data" / "fly" / "scenes.txt"
 
@@ -51,21 +61,13 @@ def test_what_becomes_of_it(
     scene = staged(flies, kind, given, happens)
     watch, mock, modes = scene.watch, scene.mock, MODES[kind]
     ending, *wanted = becomes.split(" & ")
-    seen: dict[str, Any] = {}
-    looks: list[tuple[float, Callable[[float], object]]] = []
+    seen: dict[str, tuple[int, int, bool]] = {}
 
-    def look(name: str, at: float, what: Callable[[], Any]) -> None:
-        looks.append((at, lambda _: seen.__setitem__(name, what())))
+    def look(word: str) -> None:
+        seen[word] = len(scene.orders), mock.mode, mock.armed
 
-    for each in wanted:
-        first, *words = each.split()
-        if first in ("quiet", "busy"):
-            look(each, float(words[0]), lambda: len(scene.orders))
-        elif words[:1] == ["mode"] and first[0].isdigit():
-            look(each, float(first), lambda: mock.mode)
-        elif words == ["disarmed"]:
-            look(each, float(first), lambda: mock.armed)
-    assert scene.run(looks) == ending
+    words = {word for each in wanted for word in each.split() if word.replace(".", "").isdigit()}
+    assert scene.run([(float(word), lambda _, word=word: look(word)) for word in words]) == ending
     assert scene.client.wrong == []
     outcome, findings = watch.outcome, watch.gate.findings or ()
     texts: dict[str, Any] = {
@@ -74,8 +76,7 @@ def test_what_becomes_of_it(
         "finds": [f"{each.rule} {each.message} {each.action}" for each in findings],
     }
     for each in wanted:
-        first, *words = each.split()
-        rest = " ".join(words)
+        first, _, rest = each.partition(" ")
         match first:
             case "says" | "text" | "finds":
                 assert any(rest in text for text in texts[first])
@@ -88,14 +89,11 @@ def test_what_becomes_of_it(
             case "no":
                 assert scene.orders == []
             case "orders" | "exactly":
-                given_orders = scene.commands
-                if first == "orders":
-                    given_orders = list(dict.fromkeys(given_orders))
-                assert given_orders == [ORDERS[word.lower()] for word in words]
-            case "quiet":
-                assert len(scene.orders) == seen[each]
-            case "busy":
-                assert len(scene.orders) > seen[each]
+                once = first == "orders"
+                given_orders = [*dict.fromkeys(scene.commands)] if once else scene.commands
+                assert given_orders == [ORDERS[word.lower()] for word in rest.split()]
+            case "quiet" | "busy":
+                assert (len(scene.orders) > seen[rest][0]) == (first == "busy")
             case "unmoved":
                 assert scene.after(*map(float, rest.split("-"))) == 0
             case "moved":
@@ -105,8 +103,7 @@ def test_what_becomes_of_it(
                 assert max(abs(up - 6.0) for up in heights) < 0.2
             case "in":
                 sent: list[Any] = [*filter(is_setpoint, scene.client.sent)]
-                times = [each.time_boot_ms for each in sent]
-                assert times == sorted(times)
+                assert sent == sorted(sent, key=lambda setpoint: setpoint.time_boot_ms)
             case "arrived":
                 assert scene.solution is not None
                 last = watch.seen.record().line(scene.solution).w[-1]
@@ -116,12 +113,12 @@ def test_what_becomes_of_it(
             case "armed" | "disarmed":
                 assert mock.armed == (first == "armed")
             case "end":
-                assert mock.mode == modes[words[1]]
-            case _ if words[0] == "mode":
-                assert seen[each] == modes[words[1]]
+                assert mock.mode == modes[rest.removeprefix("mode ")]
+            case _ if rest.startswith("mode "):
+                assert seen[first][1] == modes[rest.removeprefix("mode ")]
             case _:
-                assert words == ["disarmed"]
-                assert seen[each] is False
+                assert rest == "disarmed"
+                assert seen[first][2] is False
 
 
 @pytest.mark.parametrize(
@@ -130,3 +127,94 @@ def test_what_becomes_of_it(
 def test_in_no_trouble_what_must_not_happen_does(seed: int) -> None:
     """The first flights that meet trouble at random: any number of seeds can be flown."""
     assert flown(Trial.of(seed)).wrong == []
+
+
+# ---- what no words of scenes say
+
+DISARM = (MavCommand.ARM, 0.0)
+
+
+def test_why_a_vehicle_does_not_arm_or_start_is_told() -> None:
+    scene = Scene("ardupilot", arm=True)
+    scene.mock._why_not_armed = lambda: "Compass not healthy"
+    assert scene.run() == "refused"
+    answer = "the vehicle answers ARM with FAILED (it tried, or checked, and it did not work)"
+    assert scene.watch.outcome.text == f"{answer}. It says: Arm: Compass not healthy"
+    scene = Scene("px4", arm=True)
+    scene.mock._flyable = lambda: None
+    assert scene.run() == "refused"
+    denied = "answers START with DENIED (not as it was asked, or in the state that it is in)"
+    assert scene.watch.outcome.text == f"the vehicle {denied}; it is disarmed"
+
+
+def test_a_late_answer_to_arming_is_none_to_disarming() -> None:
+    scene = staged("mission", "ardupilot", {"refuses": ""}, "0-10 loses disarm")
+
+    def answer(now: float) -> None:
+        ack = CommandAck(GROUND_STATION, MavCommand.ARM, 0)
+        scene.client.on(Envelope(VEHICLE, ack), now)
+
+    assert scene.run([(3.0, answer), (3.1, answer)]) == "refused"
+    assert not scene.mock.armed
+
+
+def test_what_refuses_to_disarm_is_told_as_armed() -> None:
+    scene = staged("mission", "px4", {"refuses": ""})
+    arm = scene.mock._arm
+    scene.mock._arm = lambda wanted: arm(True) if wanted else 4
+    assert scene.run() == "refused"
+    assert "it may still be armed: it answers ARM with FAILED" in scene.watch.outcome.text
+    assert scene.commands.count(DISARM) == 5
+
+
+def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
+    scene = Scene("px4", arm=True)
+    rows = scene.mock.lists.items(MissionType.MISSION)
+
+    def changes(message: object) -> bool:
+        """Hold another mission as soon as it is armed, and say nothing to the start."""
+        if starts(message):
+            scene.mock.lists.replace(MissionType.MISSION, rows[:-1])
+        return starts(message)
+
+    scene.loses(changes)
+    assert scene.run() == "changed"
+    assert not scene.mock.armed
+
+
+def test_an_interrupt_while_an_order_is_given_takes_it_back() -> None:
+    """Ctrl-C comes anywhere: here between the order to arm, or to start, and its sending."""
+    for ordered, then in ((arms, [DISARM]), (starts, [(MavCommand.SET_MODE, 1.0)])):
+        scene = Scene("ardupilot", arm=True)
+        said = scene.watch._said
+
+        def interrupted(watch: Any = scene.watch, ordered: Any = ordered, said: Any = said) -> Any:
+            if any(ordered(message) for message in watch._out):
+                watch._said = said
+                raise KeyboardInterrupt
+            return said()
+
+        scene.watch._said = interrupted
+        with pytest.raises(KeyboardInterrupt):
+            scene.run()
+        orders = [each for each in scene.watch.cancel(100.0) if isinstance(each, CommandLong)]
+        assert [(each.command, each.param1) for each in orders] == then
+
+
+def test_what_is_answered_to_another_station_is_no_answer() -> None:
+    scene = staged("mission", "px4", {"until": "12"}, "0-5 loses arm")
+
+    def answer(now: float) -> None:
+        scene.client.on(Envelope(VEHICLE, CommandAck(FOREIGN, MavCommand.ARM, 4)), now)
+
+    assert scene.run([(4.0, answer)]) == "-"
+    assert scene.mock.armed
+
+
+def test_an_interrupt_while_it_is_read_again_ends_the_transfer() -> None:
+    scene = Scene("px4", arm=True)
+    scene.events = [(5.0, scene.client.interrupt)]
+    scene.loses(lambda message: isinstance(message, MissionRequestList))
+    assert scene.run() == "left"
+    assert scene.client.sent[-1] == MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
+    assert scene.orders == []

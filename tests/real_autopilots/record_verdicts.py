@@ -26,7 +26,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -71,11 +70,6 @@ def waypoints(items: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def qgc_fence(corners: Sequence[Sequence[float]]) -> str:
-    fence = {"polygons": [{"polygon": corners, "inclusion": True}]}
-    return json.dumps({"geoFence": fence})
-
-
 def run(folder: Path, vehicle: str, mission: dict[str, Any]) -> dict[str, Any]:
     """Fly `mission` and return what became of it; again where the simulator did not start."""
     items = unpacked(mission["items"])
@@ -93,29 +87,27 @@ def run(folder: Path, vehicle: str, mission: dict[str, Any]) -> dict[str, Any]:
             if "fence" in mission:
                 command = [__file__, "--px4-fence", json.dumps(mission["fence"]), *command]
         else:
-            command += ["--tail", "15", "--on-ground"]
-            command += ["--vehicle", vehicle.removeprefix("ardu")]
+            command += ["--tail", "15", "--on-ground", "--vehicle", vehicle.removeprefix("ardu")]
             if "fence" in mission:
+                polygons = {"polygons": [{"polygon": mission["fence"], "inclusion": True}]}
                 plan = Path(work, "fence.plan")
-                plan.write_text(qgc_fence(mission["fence"]))
+                plan.write_text(json.dumps({"geoFence": polygons}))
                 command += ["--extras", str(plan)]
         for _ in range(3):
             track.unlink(missing_ok=True)
             done = subprocess.run([sys.executable, *command], capture_output=True, text=True)
-            if done.returncode != 3 and summary.exists():
-                found = json.loads(summary.read_text())
-                if "ended_by" in found or settled(found):
-                    return became(found, commands, read_track(track))
-            elif summary.exists() and settled(json.loads(summary.read_text())):
-                return became(json.loads(summary.read_text()), commands, [])
+            ran = done.returncode != 3
+            found = json.loads(summary.read_text()) if summary.exists() else {}
+            if settled(found) or (ran and "ended_by" in found):
+                return became(found, commands, read_track(track) if ran else [])
         raise SystemExit(f"{vehicle}: not flown\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}")
 
 
 def settled(summary: dict[str, Any]) -> bool:
     """Tell whether the autopilot has said no before the flight."""
-    accepted = summary.get("ack") == "MAV_MISSION_ACCEPTED"
-    no = not accepted or summary.get("infeasible") or "why_not" in summary
-    return "ack" in summary and bool(no)
+    refused = summary.get("ack", "MAV_MISSION_ACCEPTED") != "MAV_MISSION_ACCEPTED"
+    later = "ack" in summary and (summary.get("infeasible") or "why_not" in summary)
+    return refused or bool(later)
 
 
 def read_track(track: Path) -> list[tuple[float, int]]:
@@ -156,57 +148,42 @@ def became(
         verdict = "not started" if what.startswith("AUTO") else "not armed"
         refusals = [text for text in why.split("; ") if not text.startswith(ROUTINE)]
         return found | {"verdict": verdict, "said": list(dict.fromkeys(refusals))}
-    up = [height for height, _ in track]
-    flight = Flight(
-        summary["ended_by"],
-        [number + shift for _, number in summary["reached"]],
-        [(round(t, 1), number + shift) for t, number in summary["current_changes"]],
-        summary["sim_end_s"],
-        [(height, number + shift) for height, number in track],
-    )
+    track = [(height, item + shift) for height, item in track]
+    turns = [(round(t, 1), item + shift) for t, item in summary["current_changes"]]
+    reached = [item + shift for _, item in summary["reached"]]
+    heights, end = [height for height, _ in track] or [0.0], summary["ended_by"]
+    # At the moment at which it disarms it turns to the next item, too.
+    count = summary["sim_end_s"] - 2 if end == "disarmed" else math.inf
+    last = max((k for k, each in enumerate(commands, start=1) if each <= 95), default=0)
+    if max(heights) < OFF_THE_GROUND:
+        verdict = "on the ground"
+    elif hit_ground(commands, track):
+        verdict = "crashed"
+    elif end.startswith("gave up"):
+        verdict = "stuck"
+    elif max([*reached, *(item for moment, item in turns if moment < count)], default=0) < last:
+        verdict = "ended early"
+    else:
+        verdict = "flown"
     return found | {
-        "verdict": flight.verdict(commands),
-        "end": flight.end,
-        "reached": flight.reached,
-        "highest": round(max(up, default=0.0), 1),
-        "lowest": round(min(up, default=0.0), 1),
+        "verdict": verdict,
+        "end": end,
+        "reached": reached,
+        "highest": round(max(heights), 1),
+        "lowest": round(min(heights), 1),
         "seconds": round(summary["duration_sim_s"]),
     }
 
 
-@dataclass(frozen=True)
-class Flight:
-    """A flight: why it ended and when, s; the items that were reached; those that were turned to,
-    with the time, s; height, m above home, and item, all along. Items count from 1."""
-
-    end: str
-    reached: list[int]
-    turns: list[tuple[float, int]]
-    time: float
-    track: list[tuple[float, int]]
-
-    def verdict(self, commands: Sequence[int]) -> str:
-        if max((height for height, _ in self.track), default=0.0) < OFF_THE_GROUND:
-            return "on the ground"
-        if self.hit_ground(commands):
-            return "crashed"
-        if self.end.startswith("gave up"):
-            return "stuck"
-        last = max(k for k, command in enumerate(commands, start=1) if command <= 95)
-        # At the moment at which it disarms it turns to the next item, too.
-        count = self.time - 2 if self.end == "disarmed" else math.inf
-        turned = any(item >= last and moment < count for moment, item in self.turns)
-        return "flown" if turned or max(self.reached, default=0) >= last else "ended early"
-
-    def hit_ground(self, commands: Sequence[int]) -> bool:
-        """Tell whether it came down where no item is to do with the ground."""
-        flying = False
-        for height, item in self.track:
-            flying = flying or height > OFF_THE_GROUND
-            way = commands[:item]
-            if flying and height < TOUCH and way[-1] not in TAKEOFFS and not TO_GROUND & {*way}:
-                return True
-        return False
+def hit_ground(commands: Sequence[int], track: Sequence[tuple[float, int]]) -> bool:
+    """Tell whether it came down where no item so far is to do with the ground."""
+    flying = False
+    for height, item in track:
+        flying = flying or height > OFF_THE_GROUND
+        way = commands[:item]
+        if flying and height < TOUCH and way[-1] not in TAKEOFFS and not TO_GROUND & {*way}:
+            return True
+    return False
 
 
 def with_px4_fence(fence: str, arguments: Sequence[str]) -> int:

@@ -1,7 +1,6 @@
 """A fenced mission on real autopilots with their fence on: stored, verified, flown, kept."""
 
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,7 @@ from conftest import MISSIONS, edited
 from pymavlink import mavutil
 from simulators import simulated
 
-from faao_mav import Result, plan_mission, upload
-from faao_mav.geodesy import LocalFrame
+from faao_mav import plan_mission, upload
 from faao_mav.plan import parse_plan
 
 PATIENCE = 60.0
@@ -47,41 +45,32 @@ PLAN = {
 """A wall before home, a round zone before the user, a wall on the way home."""
 
 
-@dataclass
-class Flight:
-    """What is heard of a flight."""
-
-    places: list[tuple[int, int]] = field(default_factory=list)
-    texts: list[str] = field(default_factory=list)
-    ended: bool = False
-
-
 @pytest.mark.parametrize("kind", ["arducopter", "px4"])
 def test_it_keeps_inside(kind: str, autopilots: Path, tmp_path: Path) -> None:
     changes = PLAN | {"vehicle.autopilot": "px4" if kind == "px4" else "ardupilot"}
     result = plan_mission(parse_plan(edited((MISSIONS / "copter_relay.yaml").read_text(), changes)))
+    plan, conversion = result.solution.plan, result.conversion
     assert result.flyable
-    assert result.conversion is not None
-    given = {**result.conversion.parameters, **({} if kind == "px4" else ON)}
+    assert conversion is not None
+    given = {**conversion.parameters, **({} if kind == "px4" else ON)}
     listed = ",".join(f"{name}={value:g}" for name, value in given.items())
     options = ("--params", listed, "--speedup", "8") if kind == "px4" else ("--speedup", "10")
     with simulated(autopilots, kind, tmp_path, *options) as connection:
-        report = upload(result.conversion.mission, connection, wait=PATIENCE)
+        report = upload(conversion.mission, connection, wait=PATIENCE)
         assert [part.verdict for part in report.parts] == ["verified"] * 2
-        flight = flown(connection, kind, {} if kind == "px4" else given)
-    assert flight.ended, flight.texts
-    assert not [text for text in flight.texts if "ence" in text or "ailsafe" in text]
-    area, frame = result.solution.plan.keep_in, frame_of(result)
-    assert area is not None
-    latitudes, longitudes = 1e-7 * np.array(flight.places).T
-    track = frame.to_local(latitudes, longitudes)
+        places, texts = flown(connection, kind, {} if kind == "px4" else given)
+    assert not [text for text in texts if "ence" in text or "ailsafe" in text]
+    assert plan.keep_in is not None
+    track = plan.origin.frame.to_local(*(1e-7 * np.array(places).T))
     assert np.abs(track - result.solution.w[-1]).sum(axis=1).min() < 3
-    assert area.clearance(track) > 0.5
+    assert plan.keep_in.clearance(track) > 0.5
     assert np.hypot(*track[-1]) < 3
 
 
-def flown(connection: str, kind: str, parameters: dict[str, float]) -> Flight:
-    """Set `parameters`, arm, fly the mission to its end."""
+def flown(
+    connection: str, kind: str, parameters: dict[str, float]
+) -> tuple[list[tuple[int, int]], list[str]]:
+    """Set `parameters`, arm, fly until it disarms; return its places, 1e-7 degrees, and texts."""
     link = mavutil.mavlink_connection(connection)
     link.wait_heartbeat(timeout=PATIENCE)
     for name, value in parameters.items():
@@ -95,25 +84,23 @@ def flown(connection: str, kind: str, parameters: dict[str, float]) -> Flight:
         if command(link, 400, 1) == 0:
             break
         assert time.monotonic() < end, "it does not arm"
-    flight, end, beat = Flight(), time.monotonic() + LONGEST, 0.0
-    while not flight.ended and time.monotonic() < end:
+    places, texts, beat = list[tuple[int, int]](), list[str](), 0.0
+    end = time.monotonic() + LONGEST
+    while time.monotonic() < end:
         if time.monotonic() - beat > 0.2:
             beat = time.monotonic()
             link.mav.heartbeat_send(6, 8, 0, 0, 0)
-        hear(flight, link.recv_match(blocking=True, timeout=1))
-    link.close()
-    return flight
-
-
-def hear(flight: Flight, message: Any) -> None:
-    kind = message.get_type() if message is not None else ""
-    if kind == "GLOBAL_POSITION_INT":
-        flight.places.append((message.lat, message.lon))
-    elif kind == "STATUSTEXT":
-        flight.texts.append(message.text)
-    elif kind == "HEARTBEAT" and message.get_srcComponent() == 1:
-        armed = bool(message.base_mode & 128)
-        flight.ended = not armed and len(flight.places) > 100
+        message = link.recv_match(blocking=True, timeout=1)
+        match message and message.get_type():
+            case "GLOBAL_POSITION_INT":
+                places.append((message.lat, message.lon))
+            case "STATUSTEXT":
+                texts.append(message.text)
+            case "HEARTBEAT" if message.get_srcComponent() == 1 and len(places) > 100:
+                if not message.base_mode & 128:
+                    link.close()
+                    return places, texts
+    raise AssertionError(f"no end: {texts}")
 
 
 def command(link: Any, number: int, *params: float) -> int | None:
@@ -126,8 +113,3 @@ def command(link: Any, number: int, *params: float) -> int | None:
         if answer is not None and answer.command == number:
             return int(answer.result)
     return None
-
-
-def frame_of(result: Result) -> LocalFrame:
-    origin = result.solution.plan.origin
-    return LocalFrame(origin.latitude, origin.longitude)

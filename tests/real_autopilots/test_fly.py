@@ -43,13 +43,9 @@ def options_for(kind: str, autopilots: Path, parameters: Path, where: Path) -> t
     if kind == "px4":
         tuned = ("--param-file", str(parameters), "--params", "SIH_KDV=0.2,COM_OF_LOSS_T=60")
         return ("--speedup", "10", "--keep", str(where), *tuned)
-    lines = [line for line in parameters.read_text().splitlines() if not line.startswith("#")]
-    own = where / "own.parm"
-    own.write_text(
-        "\n".join(
-            ["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 1", *(line.replace(",", " ") for line in lines)]
-        )
-    )
+    own, lines = where / "own.parm", parameters.read_text().splitlines()
+    values = [line.replace(",", " ") for line in lines if not line.startswith("#")]
+    own.write_text("\n".join(["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 1", *values]))
     defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{own}"
     return ("--speedup", "5", "--defaults", defaults)
 

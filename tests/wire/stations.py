@@ -2,7 +2,7 @@
 
 import hashlib
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -16,11 +16,7 @@ from faao_mav.sim import Behaviour, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire.jobs import upload_parts
 from faao_mav.wire.machine import Script
-from faao_mav.wire.messages import (
-    Envelope,
-    Message,
-    WireItem,
-)
+from faao_mav.wire.messages import Envelope, Message, WireItem
 from faao_mav.wire.protocol import GROUND_STATION, Address, MissionType
 from faao_mav.wire.transfer import Peer
 from faao_mav.wire.wire_items import wire_items
@@ -78,7 +74,7 @@ def rows_for(kind: str, count: int = 5, shift: float = 0.0) -> tuple[WireItem, .
     return wire_items(a_mission(count, shift), MissionType.MISSION, vehicle_of(kind))
 
 
-def places(rows: Sequence[WireItem]) -> list[tuple[int, int, int, float]]:
+def places(rows: Iterable[Any]) -> list[tuple[int, int, int, float]]:
     """Return what tells rows apart and no autopilot changes."""
     return [(row.command, row.x, row.y, row.z) for row in rows]
 
@@ -100,14 +96,12 @@ class Desk:
         return self._note(self.machine.on(envelope, self.now))
 
     def wait(self, seconds: float) -> list[Any]:
-        """Return what is sent within `seconds` of silence."""
+        """Return what is sent within `seconds` of silence; an outcome ends them."""
         end, out = self.now + seconds, list[Any]()
-        while (due := self.machine.deadline) is not None and due <= end:
-            if self.machine.outcome is not None:
-                break
-            self.now = max(self.now, due)
+        while self.machine.outcome is None and self.machine.deadline <= end:
+            self.now = max(self.now, self.machine.deadline)
             out += self._note(self.machine.tick(self.now))
-        self.now = end
+        self.now = end if self.machine.outcome is None else self.now
         return out
 
     def _note(self, messages: Sequence[Message]) -> list[Any]:

@@ -1,18 +1,22 @@
-"""Our client against our mock autopilot, over real sockets of the loopback interface."""
+"""Our client against our mock autopilot, over real sockets and lines; and the log of it."""
 
 import os
 import pty
 import select
 import socket
+import stat
 import threading
 import time
 import tty
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conftest import free_port
+from full_disk import files_of_at_most
+from pymavlink import mavutil
+from pymavlink.dialects.v20 import common
 from served import running, vehicle
 from stations import FENCE, HOME, RALLY, a_mission, mock_of, places, vehicle_of
 
@@ -21,7 +25,10 @@ from faao_mav.mission import Mission
 from faao_mav.sim import MockKind
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import download, upload
-from faao_mav.wire.protocol import MissionType
+from faao_mav.wire.codec import Codec
+from faao_mav.wire.link import Tlog
+from faao_mav.wire.messages import Heartbeat
+from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.transport import open_transport
 from faao_mav.wire.wire_items import wire_items
 
@@ -118,49 +125,92 @@ def test_a_tcp_link_that_is_closed() -> None:
         thread.join()
 
 
-@pytest.fixture
-def line() -> Iterator[tuple[int, str]]:
-    """A pseudo terminal: the same bytes as over a radio; what is beyond it, and its name."""
-    ours, theirs = pty.openpty()
-    for each in (ours, theirs):
-        tty.setraw(each)
-    yield ours, os.ttyname(theirs)
-    os.close(ours)
-    os.close(theirs)
+class Radio:
+    """The far end of a pseudo terminal, `name`: the same bytes as over a radio."""
+
+    listens = False
+
+    def __init__(self) -> None:
+        self._ours, self._theirs = pty.openpty()
+        tty.setraw(self._ours)
+        tty.setraw(self._theirs)
+        self.name = os.ttyname(self._theirs)
+
+    def read(self, timeout: float) -> list[tuple[bytes, str]]:
+        ready = select.select([self._ours], [], [], max(timeout, 0))[0]
+        return [(os.read(self._ours, 4096), "")] if ready else []
+
+    def write(self, data: bytes, _: str | None = None) -> None:
+        os.write(self._ours, data)
+
+    def close(self) -> None:
+        os.close(self._ours)
+        os.close(self._theirs)
 
 
-def test_a_serial_line(line: tuple[int, str]) -> None:
-    ours, name = line
-
-    class Radio:
-        listens = False
-
-        def read(self, timeout: float) -> list[tuple[bytes, str]]:
-            ready = select.select([ours], [], [], max(timeout, 0))[0]
-            return [(os.read(ours, 4096), "")] if ready else []
-
-        def write(self, data: bytes, _: str | None = None) -> None:
-            os.write(ours, data)
-
-        def close(self) -> None:
-            pass
-
-    with running(mock_of("ardupilot", beat=0.1), Radio()) as mock:
-        assert upload(a_mission(5), f"{name},57600", system=1).verified
+def test_a_serial_line() -> None:
+    radio = Radio()
+    with running(mock_of("ardupilot", beat=0.1), radio) as mock:
+        assert upload(a_mission(5), f"{radio.name},57600", system=1).verified
     assert len(mock.mission().items) == 5
 
 
-def test_a_serial_device_that_takes_no_bytes_is_told(
-    line: tuple[int, str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_serial_device_that_takes_no_bytes_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """A pseudo terminal that nobody reads, and that is full."""
     monkeypatch.setattr("faao_mav.wire.transport._WRITE_TIMEOUT", 0.2)
-    full = os.open(line[1], os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+    radio = Radio()
+    full = os.open(radio.name, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     for _ in range(10):  # what is under way makes room once more
         with suppress(BlockingIOError):
             while True:
                 os.write(full, bytes(64))
         time.sleep(0.02)
     with pytest.raises(LinkError, match=r"it has taken no bytes for 0\.2 s; is the vehicle"):
-        upload(a_mission(5), line[1], system=1, wait=60.0)
+        upload(a_mission(5), radio.name, system=1, wait=60.0)
     os.close(full)
+    radio.close()
+
+
+# ---- the log of an exchange
+
+
+def logged(path: Path) -> list[Any]:
+    """Return the messages in a log, as pymavlink reads them."""
+    log, found = mavutil.mavlink_connection(str(path)), []
+    while (message := log.recv_match()) is not None:
+        found.append(message)
+    log.close()
+    return found
+
+
+def test_only_its_owner_reads_a_log_which_keeps_no_key(tmp_path: Path) -> None:
+    path, key = tmp_path / "exchange.tlog", bytes(range(32))
+    setup = common.MAVLink_setup_signing_message(1, 1, list(key), 0)
+    beat = Codec(GROUND_STATION).pack(Heartbeat(6, 8, 0, 0, 4))
+    path.write_bytes(b"old")
+    path.chmod(0o644)
+    log = Tlog(path)
+    for packet in (beat, bytes(setup.pack(common.MAVLink(None, 255, 190))), beat):
+        log.write(packet, received=True)
+    log.close()
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert key[1:20] not in path.read_bytes()
+    assert [each.get_type() for each in logged(path)] == ["HEARTBEAT"] * 2
+
+
+def test_a_log_begins_with_what_is_received_and_ends_where_the_disk_is_full(tmp_path: Path) -> None:
+    """The session goes on; an old log stays until something is received."""
+    path, told = tmp_path / "exchange.tlog", list[str]()
+    path.write_bytes(b"of an important flight")
+    with pytest.raises(LinkError, match="no heartbeat"):
+        download(f"udpout:127.0.0.1:{free_port()}", log=path, wait=0.2)
+    assert path.read_bytes() == b"of an important flight"
+    with vehicle("px4", rate=0.0) as (connection, _):
+        with files_of_at_most(500):
+            report = upload(a_mission(8), connection, system=1, log=path, note=told.append)
+        assert report.verified
+        assert told == [f"{path}: cannot be written: File too large; the log ends early"]
+        assert path.stat().st_size == 500
+        with files_of_at_most(100), pytest.warns(UserWarning, match="the log ends early"):
+            download(connection, system=1, log=path)
+    assert {each.get_type() for each in logged(path)[:1]} <= {"TIMESYNC", "HEARTBEAT"}

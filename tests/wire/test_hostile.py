@@ -49,13 +49,12 @@ def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded() -> None:
 class _Liar(MockAutopilot):
     """It refuses an item, with reasons of its own."""
 
-    text = "no\x1b[2J\r\nverified     read back and compared, 1.3 s\n\x07"
-
     def _receive(self, envelope: messages.Envelope, now: float) -> Any:
         answers = super()._receive(envelope, now)
         if isinstance(envelope.message, messages.MissionItemInt):
+            text = "no\x1b[2J\r\nverified     read back and compared, 1.3 s\n\x07"
             refusal = messages.MissionAck(GROUND_STATION, MissionType.MISSION, MavResult.INVALID)
-            return [messages.Statustext(2, self.text), refusal]
+            return [messages.Statustext(2, text), refusal]
         return answers
 
 
@@ -135,15 +134,15 @@ def test_a_mission_goes_on_when_nobody_can_be_told_any_more(tmp_path: Path, hung
         assert mock.orders == [MavCommand.ARM, MavCommand.START]
 
 
-@pytest.mark.parametrize(
-    ("kind", "left"),
-    [
-        ("ardupilot", r"1 of 6\. ArduPilot may now hold old and new items mixed"),
-        ("px4", r"1 of 5\. PX4 holds the old list or the new one, whole"),
-    ],
-)
+LEFT: dict[MockKind, str] = {
+    "ardupilot": r"1 of 6\. ArduPilot may now hold old and new items mixed",
+    "px4": r"1 of 5\. PX4 holds the old list or the new one, whole",
+}
+
+
+@pytest.mark.parametrize("kind", LEFT)
 def test_a_link_that_breaks_in_an_upload_says_what_is_left(
-    kind: MockKind, left: str, monkeypatch: pytest.MonkeyPatch
+    kind: MockKind, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mock = mock_of(kind)
     theirs = Codec(VEHICLE)
@@ -160,7 +159,7 @@ def test_a_link_that_breaks_in_an_upload_says_what_is_left(
 
     air = Air(says, listens=False, waiting=waiting)
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
-    with pytest.raises(LinkError, match=f"is gone, while uploading mission at item {left}"):
+    with pytest.raises(LinkError, match=f"is gone, while uploading mission at item {LEFT[kind]}"):
         upload(a_mission(5), "/dev/ttyACM0", system=1)
 
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import common
-from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry, vehicle_of
+from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry, rows_for
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly_mission
@@ -21,14 +21,8 @@ from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec, message_id, sender_of
 from faao_mav.wire.discover import Heard, choose, discover
 from faao_mav.wire.machine import Script
-from faao_mav.wire.messages import (
-    Envelope,
-    Heartbeat,
-    Message,
-    Statustext,
-)
+from faao_mav.wire.messages import Envelope, Heartbeat, Message, Statustext
 from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address, MissionType
-from faao_mav.wire.wire_items import wire_items
 
 COPTER, ARDUPILOT, ARMED = 2, 3, 128
 BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
@@ -36,31 +30,33 @@ COMPANION = Address(1, 191)
 HERE, ELSEWHERE = "192.0.2.1:14550", "192.0.2.7:14550"
 
 
-def a_mock(system: int = 1, **options: Any) -> MockAutopilot:
-    behaviour, address = behaviour_of("ardupilot"), Address(system, 1)
-    return MockAutopilot(behaviour, home=HOME, address=address, beat=0.1, **options)
+TO = "udpin:0.0.0.0:1"
+"""Where the tests' air is, not sockets."""
+
+
+def a_mock(make: type[MockAutopilot] = MockAutopilot, **options: Any) -> MockAutopilot:
+    return make(behaviour_of("ardupilot"), home=HOME, beat=0.1, **options)
 
 
 # ---- which component is the autopilot
 
 
-def heard(*beats: tuple[float, Address, Heartbeat], **options: Any) -> tuple[Heard, float]:
+Beat = tuple[float, Address, Heartbeat]
+
+
+def heard(*beats: Beat, **options: Any) -> tuple[Heard, float]:
     """Return what is found by what is heard at which times, and when."""
-    search, now = Script(discover(**{"patience": 10.0, **options})), 0.0
-    left = sorted(beats, key=lambda each: each[0])
-    search.start(now)
-    while (due := search.deadline) is not None:
-        if left and left[0][0] <= due:
-            now, sender, beat = left.pop(0)
-            search.on(Envelope(sender, beat), now)
-        else:
-            now = due
-            search.tick(now)
-    assert search.outcome is not None
-    return search.outcome, now
+    desk = Desk(Script(discover(**{"patience": 10.0, **options})))
+    desk.start()
+    for when, sender, beat in sorted(beats, key=lambda each: each[0]):
+        desk.wait(when - desk.now)
+        desk.tell(beat, sender)
+    while desk.machine.outcome is None:
+        desk.wait(desk.machine.deadline - desk.now)
+    return desk.machine.outcome, desk.now
 
 
-def found(*beats: tuple[float, Address, Heartbeat], **options: Any) -> list[tuple[Address, bool]]:
+def found(*beats: Beat, **options: Any) -> list[tuple[Address, bool]]:
     """Return who is found, and whether it is armed."""
     return [(each.address, each.armed) for each in heard(*beats, **options)[0].vehicles]
 
@@ -86,21 +82,19 @@ def test_component_1_is_it_whoever_else_says_so_and_whenever(
     others: list[tuple[float, int, int]], when: float, system: int | None
 ) -> None:
     """Another component is it only where it is given."""
-    beats = [
-        (early, Address(1, component), Heartbeat(kind, 0, ARMED, 0, 4))
-        for early, component, kind in others
-    ]
-    outcome, now = heard(*beats, (when, VEHICLE, BEAT), system=system)
-    assert [(each.address, each.armed) for each in outcome.vehicles] == [(VEHICLE, False)]
-    assert now <= when + 1.5
-    outcome, now = heard((0.5, COMPANION, BEAT), system=1, component=191)
-    assert ([each.address for each in outcome.vehicles], now) == ([COMPANION], 0.5)
+    beats = [(t, Address(1, number), Heartbeat(kind, 0, ARMED, 0, 4)) for t, number, kind in others]
+    beats.append((when, VEHICLE, BEAT))
+    assert found(*beats, system=system) == [(VEHICLE, False)]
+    assert heard(*beats, system=system)[1] <= when + 1.5
+    asked: dict[str, Any] = {"system": 1, "component": 191}
+    assert found((0.5, COMPANION, BEAT), **asked) == [(COMPANION, False)]
+    assert heard((0.5, COMPANION, BEAT), **asked)[1] == 0.5
 
 
 def test_who_cannot_be_meant_is_said_in_a_line() -> None:
     crowd = [(0.5, Address(system, 1), BEAT) for system in range(255)]
     meant = [(0.1, Address(9, 154), Heartbeat(26, 8, 0, 0, 4)), (0.2, VEHICLE, BEAT)]
-    cases: list[tuple[int | None, list[tuple[float, Address, Heartbeat]], str]] = [
+    cases: list[tuple[int | None, list[Beat], str]] = [
         (None, crowd, "several .*; and 250 more"),
         (9, meant, r"9 within 1 s; there is only MAV_TYPE 26 .system 9, component 154.; ArduPilot"),
         (9, [], r"no heartbeat of the autopilot of system 9 within 1 s; is it switched on"),
@@ -147,29 +141,27 @@ def test_two_vehicles_of_one_number_are_not_one(monkeypatch: pytest.MonkeyPatch)
     in_the_air(monkeypatch, vehicles)
     told = f"system 1, component 1 is heard from {HERE} and {ELSEWHERE}: more than"
     for job in (
-        lambda to: upload(a_mission(5), to),
-        lambda to: fly_mission(Flight(a_mission(5)), to, arm=True, system=1),
-        lambda to: download(to),
+        lambda: upload(a_mission(5), TO),
+        lambda: fly_mission(Flight(a_mission(5)), TO, arm=True, system=1),
+        lambda: download(TO),
     ):
         with pytest.raises(LinkError, match=told):
-            job("udpin:0.0.0.0:1")
+            job()
     assert [(mock.armed, mock.mission().items) for mock in vehicles.values()] == [(False, ())] * 2
 
 
 def test_nothing_is_started_that_has_a_namesake(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another of its number comes on the air once its mission has been read."""
-    mock, other, flight = a_mock(), a_mock(), Flight(a_mission(5))
-    mock.lists.replace(
-        MissionType.MISSION,
-        wire_items(flight.mission, MissionType.MISSION, vehicle_of("ardupilot")),
-    )
-    vehicles, to = {HERE: mock}, "udpin:0.0.0.0:1"
+    mock, other = a_mock(), a_mock()
+    mock.lists.replace(MissionType.MISSION, rows_for("ardupilot", 5))
+    vehicles = {HERE: mock}
     in_the_air(monkeypatch, vehicles)
 
     def comes(_: object) -> None:
         vehicles[ELSEWHERE] = other
 
-    report = fly_mission(flight, to, arm=True, watching=comes, note=lambda _: None)
+    flight = Flight(a_mission(5))
+    report = fly_mission(flight, TO, arm=True, watching=comes, note=lambda _: None)
     assert report.ending is not None
     assert report.ending.kind == "refused"
     assert f"its number is used by another vehicle too, at {ELSEWHERE}" in report.ending.text
@@ -189,7 +181,7 @@ def test_what_comes_later_from_elsewhere_does_not_count(
             del vehicles[HERE]
             vehicles.update({ELSEWHERE: a_mock(rate=0.0), HERE: mock})
 
-    report = upload(a_mission(5), "udpin:0.0.0.0:1", observe=observe, note=notes.append, log=log)
+    report = upload(a_mission(5), TO, observe=observe, note=notes.append, log=log)
     assert report.verified
     assert len(mock.mission().items) == 5
     assert {to for data, to in air.sent if message_id(data) != 111} == {HERE}  # not TIMESYNC
@@ -217,7 +209,7 @@ def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     hurry(monkeypatch)
     monkeypatch.setattr("faao_mav.wire.jobs.ATTEMPTS", 2)
-    report = upload(a_mission(60), "udpin:0.0.0.0:1", observe=observe, note=notes.append)
+    report = upload(a_mission(60), TO, observe=observe, note=notes.append)
     assert [part.verdict for part in report.parts] == ["silent"]
     assert f"come from {ELSEWHERE} too, not only from" in notes[0]
     told = f"in its name come from {ELSEWHERE}: begin again if it is there now"
@@ -229,7 +221,7 @@ def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_only_who_flies_is_a_ground_station(monkeypatch: pytest.MonkeyPatch) -> None:
     """A failsafe for the loss of the ground station is neither hidden nor set off by looking on."""
-    mission, mock, to = a_mission(5), a_mock(speedup=100.0), "udpin:0.0.0.0:1"
+    mission, mock = a_mission(5), a_mock(speedup=100.0)
     mock.start(time.monotonic())
     air = in_the_air(monkeypatch, {HERE: mock}, echo=True)
 
@@ -239,13 +231,13 @@ def test_only_who_flies_is_a_ground_station(monkeypatch: pytest.MonkeyPatch) -> 
     def beats() -> list[bytes]:
         return [packet for packet, _ in air.sent if message_id(packet) == 0]
 
-    assert upload(mission, to, system=1).verified
-    assert download(to, system=1).home == HOME
-    watched = fly_mission(Flight(mission), to, watching=stop, system=1)
+    assert upload(mission, TO, system=1).verified
+    assert download(TO, system=1).home == HOME
+    watched = fly_mission(Flight(mission), TO, watching=stop, system=1)
     assert watched.ending is not None
     assert watched.ending.kind == "left"
     assert beats() == []
-    flown = fly_mission(Flight(mission), to, arm=True, system=1)
+    flown = fly_mission(Flight(mission), TO, arm=True, system=1)
     assert flown.ending is not None
     assert flown.ending.kind == "finished"  # our own heartbeats come back: they are no other's
     assert {sender_of(packet) for packet, _ in air.sent} == {GROUND_STATION}
@@ -261,13 +253,13 @@ def test_a_vehicle_that_takes_orders_of_one_number_only(monkeypatch: pytest.Monk
         def _receive(self, envelope: Envelope, now: float) -> Any:
             return super()._receive(envelope, now) if envelope.sender.system == 255 else ()
 
-    air = in_the_air(monkeypatch, {HERE: Strict(behaviour_of("ardupilot"), home=HOME)})
+    air = in_the_air(monkeypatch, {HERE: a_mock(Strict)})
     with monkeypatch.context() as patch:
         hurry(patch)
-        report = upload(a_mission(5), "udpin:0.0.0.0:1", system=1)
+        report = upload(a_mission(5), TO, system=1)
     assert "orders of only MAV_GCS_SYSID" in report.problems[0]
     assert "--own-system" in report.problems[0]
-    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1, own_system=255).verified
+    assert upload(a_mission(5), TO, system=1, own_system=255).verified
     senders = {sender_of(packet).system for packet, _ in air.sent}
     assert senders == {GROUND_STATION.system, 255}
 
@@ -275,19 +267,15 @@ def test_a_vehicle_that_takes_orders_of_one_number_only(monkeypatch: pytest.Monk
 def test_a_serial_port_that_waits_for_a_heartbeat_is_sent_one() -> None:
     """PX4 1.13 and 1.14 on USB; it is that of no ground station, and only into a silence."""
 
-    def asks(*heard: tuple[float, Message]) -> list[tuple[float, int]]:
-        desk, out = Desk(Script(discover(patience=6.0, knocks=True))), list[tuple[float, int]]()
+    for first_word, knocks in ((9.0, [2.0, 3.0, 4.0, 5.0]), (3.5, [2.0, 3.0]), (0.5, [])):
+        desk, sent = Desk(Script(discover(patience=6.0, knocks=True))), list[tuple[float, int]]()
         desk.start()
-        for _ in range(12):
-            sent = desk.wait(0.5)
-            out += [(desk.now, each.type) for each in sent if isinstance(each, Heartbeat)]
-            for _, message in (each for each in heard if each[0] == desk.now):
-                desk.tell(message)
-        return out
-
-    assert asks() == [(2.0, 18), (3.0, 18), (4.0, 18), (5.0, 18)]
-    assert asks((3.5, Statustext(6, "booting"))) == [(2.0, 18), (3.0, 18)]
-    assert asks((0.5, Statustext(6, "booting"))) == []
+        while desk.machine.outcome is None:
+            beats = (each for each in desk.wait(0.5) if isinstance(each, Heartbeat))
+            sent += [(desk.now, beat.type) for beat in beats]
+            if desk.now == first_word:
+                desk.tell(Statustext(6, "booting"))
+        assert sent == [(when, 18) for when in knocks]
 
 
 # ---- MAVLink 1
@@ -300,7 +288,7 @@ def test_a_vehicle_of_mavlink_1_is_told_so(monkeypatch: pytest.MonkeyPatch) -> N
     air = Air(lambda data: [] if data is None else [(packet, HERE)])
     monkeypatch.setattr("faao_mav.wire.link.open_transport", lambda _: air)
     hurry(monkeypatch)
-    (problem,) = upload(a_mission(5), "udpin:0.0.0.0:1", system=1).problems
+    (problem,) = upload(a_mission(5), TO, system=1).problems
     assert "it speaks MAVLink 1 only: set its port to MAVLink 2: SERIALn_PROTOCOL 2" in problem
 
 
@@ -319,8 +307,8 @@ def test_who_writes_mavlink_1_and_reads_2_is_served(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(Codec, "pack", old)
     in_the_air(monkeypatch, {HERE: a_mock(rate=0.0)})
-    assert upload(a_mission(5), "udpin:0.0.0.0:1", system=1).verified
+    assert upload(a_mission(5), TO, system=1).verified
     hurry(monkeypatch)
-    held = holdings("udpin:0.0.0.0:1", system=1)
+    held = holdings(TO, system=1)
     assert len(held.mission.items) == 5
     assert held.mission.unread == ("fence", "rally points")  # it cannot say what it answers about

@@ -52,10 +52,6 @@ def sdk_items(rows: tuple[WireItem, ...], part: MissionType) -> list[SdkItem]:
     ]
 
 
-def found_places(items: list[SdkItem]) -> list[tuple[int, int, int, float]]:
-    return [(item.command, item.x, item.y, item.z) for item in items]
-
-
 def assert_read_alike(client: MissionRaw, text: str, kind: str) -> None:
     """MAVSDK makes of a plan's `text` what we do."""
     read = client.import_qgroundcontrol_mission_from_string(text)
@@ -100,9 +96,12 @@ def test_mavsdk_reads_plans_uploads_downloads_clears_and_flies(kind: MockKind) -
         client.upload_rally_points(sdk_items(rally, MissionType.RALLY))
         assert places(mock.lists.items(MissionType.MISSION)) == places(rows)
         assert (mock.mission().fence, mock.mission().rally) == (FENCE, RALLY)
-        assert found_places(client.download_mission()) == places(rows)
-        assert found_places(client.download_geofence()) == places(fence)
-        assert found_places(client.download_rallypoints()) == places(rally)
+        for read, sent in (
+            (client.download_mission, rows),
+            (client.download_geofence, fence),
+            (client.download_rallypoints, rally),
+        ):
+            assert places(read()) == places(sent)
         client.clear_mission()
         assert mock.mission().items == ()
         client.upload_mission(sdk_items(rows, MissionType.MISSION))
@@ -140,4 +139,4 @@ def test_our_client_uploads_to_mavsdks_server() -> None:
     assert report.verified
     assert report.vehicle.autopilot == "generic"
     rows = wire_items(a_mission(8), MissionType.MISSION, report.vehicle.vehicle)
-    assert found_places(received[0]) == places(rows)
+    assert places(received[0]) == places(rows)

@@ -11,7 +11,7 @@ from simulate import Station, simulate
 from stations import VEHICLE, Desk, mock_of, peer_of
 
 from faao_mav.autopilot import ARDUCOPTER, PX4_COPTER
-from faao_mav.sim import MockAutopilot
+from faao_mav.sim import MockAutopilot, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire.machine import Script, Talk
 from faao_mav.wire.messages import Envelope, ParamSet, ParamValue
@@ -100,7 +100,7 @@ def test_those_of_a_mission_are_set_and_read_back() -> None:
             assert changed == {change.name for change in changes}
 
 
-def test_nothing_is_set_where_one_is_not_known() -> None:
+def test_nothing_is_set_where_one_is_not_known_and_what_is_not_kept_is_told() -> None:
     mock = mock_of("px4")
     del mock.parameters.values["MPC_JERK_AUTO"]
     before = dict(mock.parameters.values)
@@ -110,16 +110,12 @@ def test_nothing_is_set_where_one_is_not_known() -> None:
     assert "the vehicle has no MPC_JERK_AUTO: nothing was set" in problem
     assert mock.parameters.values == before
 
+    class Stubborn(MockAutopilot):
+        def _receive(self, envelope: Envelope, now: float) -> Any:
+            keeps = isinstance(envelope.message, ParamSet)
+            return () if keeps else super()._receive(envelope, now)
 
-def test_a_value_that_the_vehicle_does_not_keep_is_told() -> None:
-    mock = mock_of("ardupilot")
-    answer = mock.on
-
-    def stubborn(envelope: Envelope, now: float) -> Any:
-        keeps = isinstance(envelope.message, ParamSet)
-        return () if keeps else answer(envelope, now)
-
-    mock.on = stubborn  # type: ignore[method-assign]
+    mock = Stubborn(behaviour_of("ardupilot"), rate=0.0)
     outcome, _ = ran(set_parameters({"WPNAV_SPEED": 600.0}, peer_of("ardupilot")), mock)
     assert outcome == (
         (Change("WPNAV_SPEED", 1000.0, 600.0, 1000.0),),

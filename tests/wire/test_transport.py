@@ -3,7 +3,7 @@
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, closing
+from contextlib import closing
 
 import pytest
 from conftest import free_port
@@ -37,12 +37,11 @@ class Port:
         self.address = ("127.0.0.1", free_port(kind))
         scheme = "udpin" if kind == socket.SOCK_DGRAM else "tcpin"
         self.transport: Transport = open_transport(f"{scheme}:127.0.0.1:{self.address[1]}")
-        self._open = ExitStack()
-        self._open.enter_context(closing(self.transport))
-        self._kind = kind
+        self._kind, self._peers = kind, list[socket.socket]()
 
     def peer(self) -> socket.socket:
-        peer = self._open.enter_context(socket.socket(socket.AF_INET, self._kind))
+        peer = socket.socket(socket.AF_INET, self._kind)
+        self._peers.append(peer)
         peer.connect(self.address)
         peer.settimeout(5.0)
         return peer
@@ -55,7 +54,8 @@ class Port:
         return found
 
     def close(self) -> None:
-        self._open.close()
+        for each in (*self._peers, self.transport):
+            each.close()
 
 
 @pytest.fixture

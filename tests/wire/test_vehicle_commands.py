@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +29,6 @@ from faao_mav.wire.wire_items import wire_items
 
 def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(each) for each in arguments])
-
-
-@pytest.fixture
-def mission_file(tmp_path: Path) -> Path:
-    path = tmp_path / "m.waypoints"
-    path.write_text(write_wpl(a_mission(6)))
-    return path
 
 
 def test_upload_and_download(tmp_path: Path) -> None:
@@ -101,22 +95,15 @@ def test_the_mock_autopilot_as_a_command(monkeypatch: pytest.MonkeyPatch) -> Non
         raise KeyboardInterrupt
 
     monkeypatch.setattr(faults, "serve", until_ended)
-    results = []
-
-    def serve_it() -> None:
-        results.append(
-            run("autopilot", "--listen", f"udpin:127.0.0.1:{port}", "--kind", "px4", "--drop", 0.05)
-        )
-
-    thread = threading.Thread(target=serve_it)
-    thread.start()
-    try:
-        time.sleep(0.3)
-        assert put(a_mission(6, fence=FENCE), f"udpout:127.0.0.1:{port}", system=1).verified
-    finally:
-        ended.set()
-        thread.join()
-    (result,) = results
+    options = ("--listen", f"udpin:127.0.0.1:{port}", "--kind", "px4", "--drop", 0.05)
+    with ThreadPoolExecutor() as pool:
+        running = pool.submit(run, "autopilot", *options)
+        try:
+            time.sleep(0.3)
+            assert put(a_mission(6, fence=FENCE), f"udpout:127.0.0.1:{port}", system=1).verified
+        finally:
+            ended.set()
+    result = running.result()
     assert result.exit_code == 0, result.output
     lines = result.stdout.splitlines()
     assert lines[0] == f"px4, system 1, at udpin:127.0.0.1:{port}; Ctrl-C ends"
@@ -139,11 +126,8 @@ def test_what_can_be_read_is_written_and_what_cannot_is_told(
 ) -> None:
     """Python gets no part for the whole; without a mission nothing is written."""
     hurry(monkeypatch)
-    held, plan, text = (
-        a_mission(5, fence=FENCE, rally=RALLY),
-        tmp_path / "m.plan",
-        tmp_path / "m.waypoints",
-    )
+    held = a_mission(5, fence=FENCE, rally=RALLY)
+    plan, text = tmp_path / "m.plan", tmp_path / "m.waypoints"
     with vehicle("px4", Reticent) as (source, mock):
         for each in MissionType:
             mock.lists.replace(each, wire_items(held, each, vehicle_of("px4")))
