@@ -40,8 +40,8 @@ def test_values_are_written_removed_undone_and_done_again() -> None:
     )
     document.write(("flight", "duration"), " ")
     assert document.value(("flight", "duration")) is None
-    document.undo()
-    document.undo()
+    for _ in range(2):
+        document.undo()
     assert (document.shown(start), document.can_undo, document.can_redo) == ("", True, True)
     document.redo()
     assert document.shown(start) == "[0, 350]"
@@ -94,15 +94,12 @@ def test_what_is_put_in_is_read_again(value: Any) -> None:
 
 def test_zones_are_drawn_changed_and_removed() -> None:
     document = Document(SMALL)
-    scene = Scene(document)
-    frame = scene.frame
-    assert frame is not None
-
-    def degrees(*place: float) -> list[float]:
-        return [float(x) for x in frame.to_geodetic(place)]
-
-    circle = {"center": degrees(20, 30), "radius": 4.0, "inclusion": False, "key": None}
-    square = [degrees(*p) for p in ((-90, -90), (90, -90), (90, 90), (-90, 90))]
+    scene, frame = Scene(document), parse_plan(SMALL).origin.frame
+    center, *square = (
+        [float(x) for x in frame.to_geodetic(place)]
+        for place in ((20, 30), (-90, -90), (90, -90), (90, 90), (-90, 90))
+    )
+    circle = {"center": center, "radius": 4.0, "inclusion": False, "key": None}
     inside = {"corners": square, "inclusion": True, "key": None}
     for zone in (circle, inside):
         scene.change(zone, None)
@@ -130,17 +127,14 @@ def test_zones_are_drawn_changed_and_removed() -> None:
     assert odd.value(("fence", "exclusion")) == [{"center": [20.0, 30.0], "radius": 4.0}]
     ringless = "fence: {exclusion: [{polygon: 3}, {center: 3}, 7]}\n"
     assert Scene(Document(SMALL + ringless)).zones() == []
-
-
-def test_the_short_form_of_an_inclusion_becomes_a_list_when_it_is_changed() -> None:
+    # the short form of an inclusion becomes a list when it is changed
     document = Document((MISSIONS / "fenced_relay.yaml").read_text())
     scene = Scene(document)
-    (first, *_) = scene.zones()
+    first = scene.zones()[0]
     assert first["key"] == "inclusion/0"
-    scene.change(first, None)
-    assert [len(zone["polygon"]) for zone in document.value(("fence", "inclusion"))] == [4]
-    scene.change({**first, "key": None}, None)
-    assert [len(zone["polygon"]) for zone in document.value(("fence", "inclusion"))] == [4, 4]
+    for zone, corners in ((first, [4]), ({**first, "key": None}, [4, 4])):
+        scene.change(zone, None)
+        assert [len(each["polygon"]) for each in document.value(("fence", "inclusion"))] == corners
     assert parse_plan(document.text).zones[0].inclusion
 
 

@@ -31,10 +31,9 @@ class Held:
 
     async def answer(self, job: str, answer: Answer | Exception | None = None) -> None:
         await asyncio.sleep(0.001)
-        if isinstance(answer, Exception):
-            self.jobs[job].set_exception(answer)
-        else:
-            self.jobs[job].set_result(answer or Answer(refused=job))
+        failed = isinstance(answer, Exception)
+        tell: Any = self.jobs[job].set_exception if failed else self.jobs[job].set_result
+        tell(answer or Answer(refused=job))
         await asyncio.sleep(0.001)
 
 

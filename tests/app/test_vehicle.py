@@ -32,8 +32,9 @@ def result() -> Result:
 
 
 def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
-    phases: list[str] = []
-    seen = asyncio.Event()
+    assert result.conversion is not None
+    flight = Flight.planned(result.conversion, result.solution)
+    phases, seen = list[str](), asyncio.Event()
 
     def hear(told: dict[str, Any]) -> None:
         phases.append(told.get("phase", ""))
@@ -48,8 +49,6 @@ def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
         while "waiting" not in phases:
             await asyncio.sleep(0.05)
         assert not mock.armed
-        assert result.conversion is not None
-        flight = Flight.planned(result.conversion, result.solution)
         flown = asyncio.create_task(asyncio.to_thread(fly_mission, flight, connection, arm=True))
         await seen.wait()
         watch.cancel()
@@ -59,9 +58,7 @@ def test_a_flight_goes_on_when_who_watches_it_is_closed(result: Result) -> None:
         assert report.ending is not None
         return report.ending.kind
 
-    assert result.conversion is not None
-    timed = result.conversion.parameters
-    with vehicle(speedup=16.0, parameters=timed) as (connection, mock):
+    with vehicle(speedup=16.0, parameters=result.conversion.parameters) as (connection, mock):
         assert asyncio.run(run(connection, mock)) == "finished"
 
 

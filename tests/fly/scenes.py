@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -36,6 +37,7 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan.yaml_text import load_yaml
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages, protocol
@@ -45,6 +47,8 @@ from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
 
+DATA = Path(__file__).parents[1] / "data" / "fly"
+
 METRE = 1e7 / 111_319.5
 """A metre of latitude in 1e-7 degrees."""
 
@@ -53,48 +57,14 @@ LOITER = 5
 
 # ---- what is flown
 
-ZONE = {
-    "margin": 3,
-    "inclusion": [[-40, -60], [260, -60], [260, 120], [-40, 120]],
-    "exclusion": [{"polygon": [[80, -10], [120, -10], [120, 40], [80, 40]]}],
-}
-"""A fence with a zone across the straight of that flight."""
-
 CAP = NEAR + 8**2 / (2 * 1.6)
-"""The farthest, m, that the gate lets that flight be sent."""
+"""The farthest, m, that the gate lets the swift flight be sent."""
 
-RESTS = {
-    "flight.start_velocity": "hover",
-    "flight.end_velocity": "hover",
-    "mission.on_finish": "land",
-}
-LOW: dict[str, Any] = RESTS | {
-    "flight.altitude": 6,
-    "flight.duration": 16,
-    "vehicle.max_speed": 6,
-    "vehicle.max_acceleration": 2.5,
-}
-SWIFT: dict[str, Any] = RESTS | {
-    "flight.start": [0, 50],
-    "flight.end": [200, 0],
-    "flight.altitude": 30,
-    "flight.duration": 32,
-    "vehicle.max_speed": 8,
-    "vehicle.max_acceleration": 1.6,
-    "radio.ground_user.position": [220, 60],
-}
-SHORT = {"flight.end": [50, 0], "flight.duration": 50, "radio.ground_user.position": [60, 60]}
-PLANS: dict[str, dict[str, Any]] = {
-    "low": LOW,
-    "hovers": LOW | {"mission.on_finish": "hover"},
-    "away": LOW | {"site.origin.latitude": HOME.latitude + 0.001},
-    "swift": SWIFT,
-    "fenced": SWIFT | {"fence": ZONE, "flight.duration": 36},
-    "waiting": SWIFT | SHORT,
-}
-"""Flights by setpoints: a low one of 16 s at up to 6 m/s, which may hover at its end, or begin away
-from where the vehicle stands; a swift one, which flies 8 m/s for most of 206 m, with a zone across
-its straight or without; and one that waits in the middle."""
+PLANS: dict[str, dict[str, Any]] = {}
+"""Flights by setpoints, as changes of the small plan."""
+
+for _name, _changes in load_yaml((DATA / "plans.yaml").read_text(), "plans.yaml").items():
+    PLANS[_name] = PLANS.get(_changes.pop("like", ""), {}) | _changes
 
 FAR = MissionItem(16, 3, x=HOME.latitude + 0.01, y=HOME.longitude, z=30.0)
 MISSIONS = {
@@ -110,7 +80,7 @@ def planned(flight: str) -> Solution:
 
 def under(changes: dict[str, Any]) -> Solution:
     """Return the low flight for a plan that has what does not change it otherwise."""
-    plan = parse_plan(edited(FLYABLE, LOW | changes))
+    plan = parse_plan(edited(FLYABLE, PLANS["low"] | changes))
     return replace(planned("low"), problem=build_problem(plan))
 
 
@@ -199,6 +169,7 @@ PICKED: dict[str, Picks] = {
     "disarm": lambda message: arms(message, 0.0),
     "start": starts,
     "setpoints": is_setpoint,
+    "lists": lambda message: isinstance(message, messages.MissionRequestList),
     "hold": lambda message: (
         isinstance(message, CommandLong)
         and message.command == MavCommand.SET_MODE
@@ -526,6 +497,10 @@ def staged(flies: str, kind: str, given: Mapping[str, str], happens: str = "") -
     )
     if "stays-armed" in given:
         scene.mock.flight.aircraft.landed = lambda _: False
+    if "unwell" in given:
+        scene.mock._why_not_armed = lambda: "Compass not healthy"
+    if "not-flyable" in given:
+        scene.mock._flyable = lambda: None
     if "refuses" in given:
         scene.loses(starts, denied=MavCommand.START)
     silences = list[tuple[float, float]]()

@@ -22,7 +22,7 @@ from typing import Any
 
 import pytest
 from conftest import FLYABLE, edited
-from scenes import Scene, away, held_by, holding
+from scenes import DATA, Scene, away, held_by, holding
 from served import vehicle
 from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of
 from typer.testing import CliRunner, Result
@@ -43,7 +43,6 @@ from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
 from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.transfer import PartReport
 
-GATE = Path(__file__).parents[1] / "data" / "fly" / "gate.txt"
 LEVELS = {"errs": Level.ERROR, "warns": Level.WARNING, "notes": Level.NOTE}
 PLACES = {
     "abroad": Home(47.4, 8.5, 584.0),
@@ -107,7 +106,7 @@ def numbers(text: str) -> dict[str, float]:
 
 
 def rows() -> Iterator[Any]:
-    for line in GATE.read_text().splitlines():
+    for line in (DATA / "gate.txt").read_text().splitlines():
         if line and not line.startswith("#"):
             (kind, *words), (first, *rest) = (
                 part.split(separator)

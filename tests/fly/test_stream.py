@@ -10,7 +10,7 @@ from conftest import FLYABLE, edited
 from flight_logs import heights
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import CAP, SWIFT, Scene, is_setpoint, planned, staged, under
+from scenes import CAP, PLANS, Scene, is_setpoint, planned, staged, under
 from stations import VEHICLE, a_mission, vehicle_of
 
 from faao_mav import optimize, parse_plan
@@ -240,7 +240,7 @@ def test_an_aircraft_that_does_not_follow_is_given_up() -> None:
 
 
 def test_a_course_is_what_its_pieces_add_up_to() -> None:
-    plan = parse_plan(edited(FLYABLE, SWIFT | {"flight.start_velocity": [3.0, 4.0]}))
+    plan = parse_plan(edited(FLYABLE, PLANS["swift"] | {"flight.start_velocity": [3.0, 4.0]}))
     at_speed = optimize(plan)
     corners = [[0, 0, 0], [0, 0, 30], [40, 30, 30], [40, 31, 30]]
     for course in (Course.of(at_speed), Course.through(corners, [(2.0, 1.0), *[(8.0, 1.6)] * 2])):

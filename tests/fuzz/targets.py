@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout, suppress
-from functools import partial
 from pathlib import Path
 
 import mutate
@@ -31,39 +30,8 @@ from faao_mav.validate.flown import FlightRecord
 
 _DATA = Path(__file__).parent.parent / "data"
 
-_BRIEF = SMALL + "optimizer: {max_iterations: 1, starts: [straight]}\n"
-
-_STUDY = (
-    SMALL
-    + """
-study:
-  vary: {power_dbm: [-40, 0.5, 1e1], radio.modulation: [bpsk, 8psk]}
-  schemes: [faao, mrt]
-mission: {parameters: keep, takeoff: false}
-"""
-)
-
-_PARAMETERS = (
-    b"# vehicle\nWPNAV_SPEED,800\nWPNAV_JERK 1.5\nFENCE_TYPE 0x7 # circle\nSYS_ID,1,@READONLY\n",
-    b"# Vehicle-Id Component-Id Name Value Type\n1\t1\tMPC_XY_CRUISE\t5.000\t9\n1\t1\tNAV\t3\t6\n",
-)
-
-_FENCED = (
-    SMALL
-    + """
-fence:
-  inclusion: [[-50, -50], [120, -50], [120, 120], [-50, 120]]
-  exclusion: [{center: [30, 30], radius: 4}, {polygon: [[20, 5], [25, 5], [25, 9]]}]
-  margin: 2
-"""
-)
-
-_LINK = (
-    b"reference_gain_db: -44.5\nelevation_db: [18, -30, 10]\nspread_db: 5.5\nabout: May\n"
-    b"elevation_deg: [2, 50]\n"
-)
-_RATES = b"# own\nmcs, snr_db, mbit_per_s\n0, 4, 6.5\n1, 7, 13\n2, 9.5, 19.5\n"
-_MAP = b"# own\neast_m, north_m, gain_db\n0, 0, -80\n0, 9, -81.5\n9, 0, nan\n9, 9, -83\n"
+_SEEDS = {path.name: path.read_bytes() for path in (Path(__file__).parent / "seeds").iterdir()}
+"""Sound inputs that no other test has; of plans, what follows the small one."""
 
 _LARGEST_SEED = 5_000
 """Bytes of a mission that is mutated; chosen: small ones are read often."""
@@ -72,10 +40,6 @@ _CHANGES = {".npz": mutate.archive} | dict.fromkeys((".bin", ".tlog", ".ulg"), m
 """How files with these endings are mutated; others are as text."""
 
 _VALUES = (b"flight.duration=60:120:30", b"power_dbm=-40:0:5,7", b"radio.modulation=bpsk,8psk")
-
-
-def _beside(plan: Path, _: Path) -> object:
-    return read_plan(plan)
 
 
 def targets(directory: Path) -> dict[str, Target]:
@@ -92,29 +56,31 @@ def targets(directory: Path) -> dict[str, Target]:
 
     for beside in MISSIONS.glob("*.csv"):
         (directory / beside.name).write_bytes(beside.read_bytes())
+    small, brief = SMALL.encode(), SMALL + "optimizer: {max_iterations: 1, starts: [straight]}\n"
     plans = [path.read_bytes() for path in sorted(MISSIONS.glob("*.yaml"))]
-    add("plan", "plan.yaml", read_plan, SMALL.encode(), _STUDY.encode(), *plans)
-    add("fenced_plan", "fenced.yaml", read_plan, _FENCED.encode())
-    for key, name, seed in (("gain", "link.yaml", _LINK), ("rates", "rates.csv", _RATES)):
+    add("plan", "plan.yaml", read_plan, small, small + _SEEDS["study.yaml"], *plans)
+    add("fenced_plan", "fenced.yaml", read_plan, small + _SEEDS["fence.yaml"])
+    for key, name in (("gain", "link.yaml"), ("rates", "rates.csv")):
         plan = directory / f"{key}.yaml"
         plan.write_text(f"{SMALL}  bandwidth_mhz: 20\n  {key}: {name}\n")
-        add(key, name, partial(_beside, plan), seed)
+        add(key, name, lambda _, plan=plan: read_plan(plan), _SEEDS[name])
     side = np.arange(3.0)
     known = GainMap(
         side, side, side[1:], np.full((2, 3, 3), -90.0), False, np.ones((3, 3)), (47, 8)
     )
     add("map", "map.npz", read_map, map_archive(known))
-    add("map_table", "map.csv", read_map, _MAP)
+    add("map_table", "map.csv", read_map, _SEEDS["map.csv"])
     zones = _DATA / "fences" / "zones"
     for ending in ("kml", "geojson"):
         add(ending, f"fence.{ending}", _fence, zones.with_suffix(f".{ending}").read_bytes())
     add("wpl", "mission.waypoints", _mission, *_missions("*.waypoints", "*.txt"))
     add("qgc_plan", "mission.plan", _mission, *_missions("*.plan"))
-    add("parameters", "vehicle.param", read_parameters, *_PARAMETERS)
+    parameters = (_SEEDS["vehicle.param"], _SEEDS["vehicle.params"])
+    add("parameters", "vehicle.param", read_parameters, *parameters)
     solution = directory / "solution.npz"
-    save_solution(optimize(parse_plan(_BRIEF)), solution)
+    save_solution(optimize(parse_plan(brief)), solution)
     add("npz", "result.npz", load_solution, solution.read_bytes())
-    cases = make_cases(_BRIEF, vary={"flight.altitude": [40, 50]})
+    cases = make_cases(brief, vary={"flight.altitude": [40, 50]})
     run_study(cases, jobs=1, directory=directory)
 
     def rows(path: Path) -> object:

@@ -30,7 +30,6 @@ from faao_mav.wire.jobs import UploadReport, download_lists, explain, upload_par
 from faao_mav.wire.machine import Machine, Script, Talk, ask_alive, ask_for
 from faao_mav.wire.messages import (
     CommandLong,
-    Heartbeat,
     HomePosition,
     MissionRequestInt,
     MissionRequestList,
@@ -79,31 +78,25 @@ def tape_of(packets: Sequence[bytes]) -> bytes:
 def converse(machine: Machine[Any], codec: Codec, heard: Iterator[bytes], now: float) -> float:
     """Run `machine` on what is `heard`, then on silence, to its end; return the time of that, s.
 
-    What it sends is made into packets. Raises `AssertionError` if it does not end.
+    Raises `AssertionError` if it does not end.
     """
-    begun = now
+    end = now + 3600
     packed(codec, machine.start(now))
     while machine.outcome is None:
-        assert now - begun < 3600, f"no end: {machine}"
-        datagram = next(heard, None)
-        now += _STEP
+        datagram, now = next(heard, None), now + _STEP
         if datagram is None:
-            assert machine.deadline is not None, f"waits for ever: {machine}"
-            now = max(now, machine.deadline)
-        else:
-            answer(machine, codec, datagram, now)
-        packed(codec, machine.tick(now))
+            now = max(now, machine.deadline or 0.0)
+        tell(machine, codec, datagram or b"", now)
+        assert now < end, f"no end: {machine}"
     return now
 
 
-def answer(machine: Machine[Any], codec: Codec, datagram: bytes, now: float) -> list[bytes]:
-    """Return the packets with which `machine` answers `datagram`."""
-    return [
-        packet
-        for heard in codec.parse(datagram)
-        if heard.envelope is not None
-        for packet in packed(codec, machine.on(heard.envelope, now))
-    ]
+def tell(machine: Machine[Any], codec: Codec, datagram: bytes, now: float) -> None:
+    """Tell `machine` the packets in a datagram and the time, and make packets of what it says."""
+    for heard in codec.parse(datagram):
+        if heard.envelope is not None:
+            packed(codec, machine.on(heard.envelope, now))
+    packed(codec, machine.tick(now))
 
 
 def packed(codec: Codec, messages: Sequence[Any]) -> list[bytes]:
@@ -171,7 +164,7 @@ def wire_targets() -> dict[str, Target]:
             return _serve(kind, content)
 
         found.append(Target(f"mock_{kind}", serve, [tape], mutated))
-    genuine = packed(Codec(VEHICLE, _signing()), [_said(number) for number in range(20)])
+    genuine = packed(Codec(VEHICLE, _signing()), [Statustext(6, f"{n}") for n in range(20)])
     found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
     return {target.name: target for target in found}
 
@@ -250,14 +243,11 @@ def _serve(kind: MockKind, tape: bytes) -> object:
         *(MissionRequestList(VEHICLE, part) for part in MissionType),
         *(MissionRequestInt(VEHICLE, part, 0) for part in MissionType),
     ]
-    now = 0.0
-    for datagram in [*datagrams(tape), *packed(station, asked)]:
-        now += 0.01
-        answer(mock, vehicle, datagram, now)
-        packed(vehicle, mock.tick(now))
+    heard = [*datagrams(tape), *packed(station, asked)]
+    for number, datagram in enumerate(heard, start=1):
+        tell(mock, vehicle, datagram, 0.01 * number)
     for later in (1.0, 10.0, 100.0, 1e4):
-        packed(vehicle, mock.tick(now + later))
-    assert mock.deadline is not None
+        tell(mock, vehicle, b"", 0.01 * len(heard) + later)
     assert math.isfinite(mock.deadline)
     return mock.lists
 
@@ -267,16 +257,10 @@ def _signing() -> Signing:
     return Signing(bytes(range(32)), clock=lambda: 1_800_000_000.0)
 
 
-def _said(number: int) -> Heartbeat | Statustext:
-    return Heartbeat(2, 12, 0, 0, 3) if number % 3 else Statustext(6, f"number {number}")
-
-
 def _take(tape: bytes, genuine: Sequence[bytes]) -> object:
     """Take what is on `tape` as who holds the key does: each packet of `genuine` once, no other."""
-    codec, framer, taken = Codec(GROUND_STATION, _signing()), Framer(), list[bytes]()
-    for datagram in datagrams(tape):
-        for packet in framer.feed_datagram(datagram):
-            taken += [found.raw for found in codec.parse(packet)]
-    order = [genuine.index(packet) for packet in taken]
+    codec, framer = Codec(GROUND_STATION, _signing()), Framer()
+    packets = [packet for each in datagrams(tape) for packet in framer.feed_datagram(each)]
+    order = [genuine.index(found.raw) for packet in packets for found in codec.parse(packet)]
     assert order == sorted(set(order)), order
-    return taken
+    return order

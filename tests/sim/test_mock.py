@@ -1,12 +1,13 @@
 """Mock autopilots take and give lists as real ones did, and what no recorded exchange shows."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import pytest
-from exchanges import exchanges, played, recorded
-from stations import FOREIGN, HOME, VEHICLE, Desk, a_mission, places, rows_for, vehicle_of
+from exchanges import EXCHANGES, exchanges, parsed, played, recorded, written
+from stations import FOREIGN, HOME, VEHICLE, Desk, a_mission, vehicle_of
 
 from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.px4 import PX4, px4_mode
@@ -14,15 +15,15 @@ from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.wire import messages
-from faao_mav.wire.messages import Message, WireItem
+from faao_mav.wire.messages import Message, Statustext
 from faao_mav.wire.parameters import carried, value_in
-from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
+from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
 from faao_mav.wire.wire_items import wire_items
 
 T = TypeVar("T", bound=Message)
 
 BOTH = pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-MISSION, _, RALLY = MissionType
+BY_HAND = exchanges((EXCHANGES / "mock.txt").read_text())
 RTL, AUTO = 6, {"ardupilot": 3, "px4": px4_mode(4, 4)}
 HOLD, OFFBOARD, LAND = px4_mode(4, 3), px4_mode(6, 0), px4_mode(4, 6)
 STILL = messages.SetPositionTargetLocalNed(VEHICLE, 0, 1, 3072, 0, 0, -20.0, 0, 0, 0, 0, 0, 0)
@@ -47,6 +48,19 @@ def only(said: Sequence[Message], kind: type[T]) -> list[T]:
 # ---- lists
 
 
+def on_desk(desk: Desk) -> Callable[[str, int], list[Message]]:
+    """Return what tells the mock on a `desk` the lines of an exchange."""
+
+    def tell(line: str, _: int) -> list[Message]:
+        if line.startswith("~"):
+            said = desk.wait(float(line[2:]))
+        else:
+            said = desk.tell(parsed(line[2:], VEHICLE), FOREIGN if line[0] == "&" else None)
+        return [each for each in said if isinstance(each, messages.ListMessage | Statustext)]
+
+    return tell
+
+
 @pytest.mark.parametrize(
     ("kind", "aircraft", "real"),
     [
@@ -57,99 +71,32 @@ def only(said: Sequence[Message], kind: type[T]) -> list[T]:
 )
 def test_the_mock_answers_as_the_real_one(kind: MockKind, aircraft: str, real: str) -> None:
     desk = desk_for(kind, aircraft=aircraft, rate=0.0)
+    tell = on_desk(desk)
 
-    def talk(sent: list[Message], seconds: float, expected: int) -> list[Message]:
-        said = [answer for message in sent for answer in desk.tell(message)]
-        return only([*said, *([] if sent else desk.wait(seconds))], messages.ListMessage)
+    def about_lists(line: str, expected: int) -> list[Message]:
+        return only(tell(line, expected), messages.ListMessage)
 
     for name, lines in exchanges(recorded(real)).items():
-        assert (name, played(lines, talk, VEHICLE)) == (name, lines)
+        assert (name, played(lines, about_lists)) == (name, lines)
 
 
-def count(n: int, part: int = MISSION) -> messages.MissionCount:
-    return messages.MissionCount(VEHICLE, part, n)
+@pytest.mark.parametrize("name", BY_HAND)
+def test_the_mock_answers_what_no_real_one_was_asked(name: str) -> None:
+    kind: Any = name.partition(":")[0]
+    assert played(BY_HAND[name], on_desk(desk_for(kind))) == BY_HAND[name]
 
 
-def item(seq: int, row: WireItem, part: MissionType = MISSION) -> messages.MissionItemInt:
-    return messages.MissionItemInt(VEHICLE, part, seq, row)
-
-
-def results(said: Sequence[Message]) -> list[int]:
-    return [message.type for message in only(said, messages.MissionAck)]
-
-
-def asked(said: Sequence[Message]) -> list[int]:
-    return [message.seq for message in only(said, messages.MissionRequestInt)]
-
-
-def upload(desk: Desk, rows: Sequence[WireItem], sender: Address = GROUND_STATION) -> list[int]:
-    """Upload without a fault and return the last answer's results."""
-    out = desk.tell(count(len(rows)), sender)
-    for seq, row in enumerate(rows):
-        assert asked(out) == [seq]
-        out = desk.tell(item(seq, row), sender)
-    return results(out)
-
-
-@BOTH
-def test_an_upload_that_stops_is_asked_for_and_given_up(kind: MockKind) -> None:
-    """After 8 s ArduPilot says so and has old and new items mixed; after 5 s PX4 has the old."""
-    ardupilot = kind == "ardupilot"
-    desk, old, new = desk_for(kind), rows_for(kind, 4), rows_for(kind, 4, shift=0.1)
-    upload(desk, old)
-    desk.tell(count(len(new)))
-    for seq in range(3):
-        desk.tell(item(seq, new[seq]))
-    assert asked(desk.wait(1.01)) == [3] * (1 if ardupilot else 4)
-    out = desk.wait(7.0 if ardupilot else 4.0)
-    assert results(out) == [MavResult.OPERATION_CANCELLED] * ardupilot
-    assert any("timeout" in each.text for each in only(out, messages.Statustext))
-    held = (*new[:3], *old[3:]) if ardupilot else old
-    assert places(desk.machine.lists.items(MISSION)) == places(held)
-    assert results(desk.tell(item(3, new[3]))) == [MavResult.ERROR]
-    assert upload(desk, new) == [MavResult.ACCEPTED]
-
-
-@BOTH
-def test_another_partner_is_denied_by_ardupilot_and_an_error_for_px4(kind: MockKind) -> None:
-    """ArduPilot takes two lists at once, PX4 does not, and is freed by a cancellation."""
-    ardupilot, desk, rows = kind == "ardupilot", desk_for(kind), rows_for(kind, 3)
-    desk.tell(count(len(rows)))
-    refusal = MavResult.DENIED if ardupilot else MavResult.ERROR
-    assert results(desk.tell(count(3), FOREIGN)) == [refusal]
-    out = desk.tell(item(0, rows[0]), FOREIGN)
-    assert results(out) == [MavResult.DENIED] * ardupilot
-    assert asked(desk.tell(item(0, rows[0]))) == [1]
-    out = desk.tell(count(1, RALLY))
-    assert (asked(out), results(out)) == (([0], []) if ardupilot else ([], [1]))
-    desk.tell(messages.MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED))
-    assert asked(desk.tell(count(3), FOREIGN)) == [0] * (not ardupilot)
-
-
-def test_what_is_no_list_or_comes_before_it_is_ready_or_is_no_item() -> None:
-    """Items are refused by the field; what is prescribed comes before."""
-    for kind, limit in (("ardupilot", 655), ("px4", 1000)):
-        desk = desk_for(kind)  # type: ignore[arg-type]
-        assert results(desk.tell(count(1, 230))) == [MavResult.UNSUPPORTED]
-        assert results(desk.tell(count(limit + 1))) == [MavResult.NO_SPACE]
-        assert asked(desk.tell(count(limit))) == [0]
+def test_lists_come_after_booting_and_what_is_prescribed_before_what_it_does_by_itself() -> None:
+    """In its exchanges a mock is ready, and answers for itself."""
     desk = desk_for("ardupilot", boot=5.0)
-    assert results(desk.tell(count(3))) == [MavResult.NO_SPACE]
-    desk.wait(5.1)
-    assert asked(desk.tell(count(3))) == [0]
-    place, none = (-353_000_000, 1_491_000_000, 9.0), (0.0, 0.0, 0.0, 0.0)
-    first, unset = rows_for("px4", 2)[0], (math.nan,) * 4
-    for kind, row, result in (
-        ("ardupilot", WireItem(1, 3, none, *place), MavResult.INVALID),
-        ("ardupilot", WireItem(16, 3, (0.0, *unset[1:]), *place), MavResult.INVALID_PARAM2),
-        ("ardupilot", WireItem(16, 3, none, 910_000_000, 0, 9.0), MavResult.INVALID_PARAM5_X),
-        ("px4", WireItem(82, 3, none, *place), MavResult.UNSUPPORTED),
-        ("px4", WireItem(16, 10, none, *place), MavResult.UNSUPPORTED_FRAME),
-        ("px4", WireItem(16, 3, unset, *place), MavResult.ACCEPTED),
-    ):
-        assert upload(desk_for(kind), (first, row)) == [result], (kind, row)  # type: ignore[arg-type]
-        told = MavResult.INVALID_PARAM3
-        assert upload(desk_for("px4", refusals={(MISSION, 1): told}), (first, row)) == [told]
+    for answer in ("ack mission NO_SPACE", "request mission 0 legacy"):
+        assert [written(each) for each in on_desk(desk)("> count mission 3", 1)] == [answer]
+        desk.wait(5.1)
+    tell = on_desk(desk_for("px4", refusals={(MissionType.MISSION, 0): MavResult.INVALID_PARAM3}))
+    tell("> count mission 1", 1)
+    assert [written(each) for each in tell("> item mission 0 way", 1)] == [
+        "ack mission INVALID_PARAM3"
+    ]
 
 
 # ---- commands, parameters, flight
@@ -201,11 +148,12 @@ def test_it_flies_what_it_holds_once_it_is_armed_and_told_to(kind: MockKind) -> 
     assert held.position == pytest.approx(there.position, abs=0.1)
     assert held.item == there.item
     assert result(desk, auto) == 0
-    assert not only(desk.wait(1.0), messages.Statustext)
+    assert not only(desk.wait(1.0), Statustext)
     if kind == "ardupilot":  # which keeps a mission that it flies
-        assert results(desk.tell(messages.MissionClearAll(VEHICLE, 0))) == [MavResult.ERROR]
+        (kept,) = desk.tell(messages.MissionClearAll(VEHICLE, 0))
+        assert kept.type == MavResult.ERROR
     assert result(desk, desk.machine.flight.modes.at_fence["return"]) == 0
-    said = only(desk.wait(300.0), messages.Statustext)
+    said = only(desk.wait(300.0), Statustext)
     assert "Landed, disarming" in [text.text for text in said]
     assert desk.machine.flight.aircraft.at(desk.now).position == pytest.approx([0, 0, 0])
     assert (result(desk, auto), result(desk, ARM)) == (0, 0)
@@ -252,18 +200,38 @@ def test_parameters(kind: MockKind) -> None:
         assert (value_in(answer, vehicle), answer.param_type) == (3, 6)
 
 
+def stream(desk: Desk) -> None:
+    """Send setpoints for two seconds."""
+    for _ in range(20):
+        desk.tell(STILL)
+        desk.wait(0.1)
+
+
+@BOTH
+def test_no_setpoint_brings_it_down(kind: MockKind) -> None:
+    desk = desk_for(kind)
+    stream(desk)
+    guided = desk.machine.flight.modes.guided
+    assert (result(desk, guided), result(desk, ARM)) == (0, 0)
+    desk.tell(command(22, *[0] * 6, 20.0))
+    for value in (0.0, math.nan, math.inf, 3e38, -3e38):
+        for field in ("x", "vx", "afx"):
+            wrong: dict[str, Any] = {field: value}
+            desk.tell(replace(STILL, **wrong))
+            assert only(desk.wait(0.5), messages.GlobalPositionInt)
+    assert desk.machine.armed
+
+
 def test_a_reboot_keeps_what_is_stored() -> None:
     desk = desk_for("px4", a_mission(5), boot=2.0)
     desk.wait(3.0)
     assert result(desk, ARM) == 0
-    for _ in range(20):
-        desk.tell(STILL)
-        desk.wait(0.1)
+    stream(desk)
     assert result(desk, REBOOT) == 0
     assert result(desk, OFFBOARD) == 1  # no setpoints since
     assert not desk.machine.armed
     assert result(desk, ARM) == 1
-    assert len(desk.machine.lists.items(MISSION)) == 5
+    assert len(desk.machine.lists.items(MissionType.MISSION)) == 5
     desk.wait(2.5)
     assert result(desk, ARM) == 0
 
@@ -308,7 +276,7 @@ def test_at_its_fence_it_does_what_its_parameters_say(
     changes = [beat.custom_mode for beat in only(desk.sent, messages.Heartbeat)]
     assert [m for m, before in zip(changes, [None, *changes], strict=False) if m != before] == modes
     told = kind == "px4" or bool(parameters)
-    assert told == any("fence" in text.text for text in only(desk.sent, messages.Statustext))
+    assert told == any("fence" in text.text for text in only(desk.sent, Statustext))
     desk = desk_for(kind, kept_within(100.0, north=0.01), parameters=parameters)
     keeps = kind == "ardupilot" and bool(parameters)  # it does not arm outside
     assert result(desk, ARM) == (4 if keeps else 0)

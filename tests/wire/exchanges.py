@@ -1,4 +1,4 @@
-"""What autopilots answer in the mission protocol, as recorded exchanges.
+"""What autopilots answer in the mission protocol, and our client to them, as exchanges in words.
 
 `tests/data/exchanges/` has one file for each autopilot: real ones gave the answers, and the mocks
 are held to them. Each exchange begins with its name after `#`; a line `> ...` is what a ground
@@ -9,17 +9,25 @@ station sends, `~ SECONDS` is silence of it, and the lines `< ...` after it are 
     request mission 0            MISSION_REQUEST_INT
     list mission, clear mission  MISSION_REQUEST_LIST, MISSION_CLEAR_ALL
     ack mission ACCEPTED         MISSION_ACK
+    beat 2 3 128                 HEARTBEAT: type, autopilot, flags
+    text WORDS                   STATUSTEXT
+
+Two files are made by hand. In `mock.txt` lines `& ...` come from another ground station. In
+`client.txt` the vehicle speaks first: lines `< ...` are what it says, `FROM < ...` who else says
+it and `TO` whom it says it to, if not to us; the lines `> ...` after it are what the client says,
+and `= ...` how its job ends.
 
 `python tests/wire/exchanges.py arducopter` (or arduplane, px4) writes the answers of a real one
 into the file. Each line waits for as many answers as the file has: what is new needs two runs.
 """
 
+import math
 import os
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import takewhile
 from pathlib import Path
-from typing import TypeAlias
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
@@ -29,6 +37,7 @@ from faao_mav.wire.discover import discover
 from faao_mav.wire.link import WireLink
 from faao_mav.wire.machine import AT_ONCE, Talk
 from faao_mav.wire.messages import (
+    Heartbeat,
     ListMessage,
     Message,
     MissionAck,
@@ -38,16 +47,13 @@ from faao_mav.wire.messages import (
     MissionRequest,
     MissionRequestInt,
     MissionRequestList,
+    Statustext,
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 
 EXCHANGES = Path(__file__).parent.parent / "data" / "exchanges"
 _FILES = {"arducopter": "ardupilot.txt", "arduplane": "ardupilot.txt", "px4": "px4.txt"}
-
-Tell: TypeAlias = Callable[[list[Message], float, int], list[Message]]
-"""Sends messages, and returns what is said about lists within so many seconds, or as soon as there
-are so many answers."""
 
 QUIET = 0.1
 """Seconds without a word after which an autopilot says nothing: chosen, below the 0.25 s after
@@ -66,7 +72,13 @@ def _row(command: int, frame: int, *params: float, z: float = 20.5, step: int = 
 ROWS = {
     "home": _row(16, 0, z=0.0),
     "way": _row(16, 3),
+    "other": _row(16, 3, step=1),
     "unknown": _row(4242, 3),
+    "none": _row(1, 3),
+    "spline": _row(82, 3),
+    "terrain": _row(16, 10),
+    "unset": _row(16, 3, 0.0, math.nan),
+    "beyond": WireItem(16, 3, (0.0, 0.0, 0.0, 0.0), 910_000_000, 0, 9.0),
     "frame1": _row(16, 1),
     "vertex0": _row(5001, 0, 3.4, 2.5, 3.5, 4.5, z=7.5),
     "vertex1": _row(5001, 3, 3.0, z=0.0, step=1),
@@ -98,46 +110,51 @@ def exchanges(text: str) -> dict[str, list[str]]:
     return found
 
 
-def played(lines: list[str], talk: Tell, vehicle: Address) -> list[str]:
-    """Return `lines` with the answers that `talk` gives in place of those that they have."""
-    out = []
-    for number, line in enumerate(lines):
-        if line.startswith("<"):
-            continue
-        expected = 0
-        while lines[number + 1 + expected : number + 2 + expected] and lines[
-            number + 1 + expected
-        ].startswith("<"):
-            expected += 1
-        out.append(line)
-        if line.startswith("~"):
-            answers = talk([], float(line[2:]), expected)
-        else:
-            answers = talk([_parsed(line[2:].split(), vehicle)], PATIENCE, expected)
-        out += [f"< {_written(answer)}" for answer in answers]
+def played(
+    lines: list[str], tell: Callable[[str, int], Sequence[Message]], answers: str = "<"
+) -> list[str]:
+    """Return `lines` with the answers that `tell` gives in place of those that they have.
+
+    It is told each line that is none, and how many answers that has.
+    """
+    out = list[str]()
+    for at, line in enumerate(lines):
+        if not line.startswith(answers):
+            had = takewhile(lambda each: each.startswith(answers), lines[at + 1 :])
+            said = tell(line, len([*had]))
+            out += [line, *(f"{answers} {written(each)}" for each in said)]
     return out
 
 
-def _parsed(words: list[str], vehicle: Address) -> Message:
-    match words:
+def parsed(text: str, to: Address) -> Message:
+    """Return the message that `text` says."""
+    match text.split():
         case ["count", part, number]:
-            return MissionCount(vehicle, _TYPES[part], int(number))
+            return MissionCount(to, _type(part), int(number))
         case ["item", part, number, row]:
-            return MissionItemInt(vehicle, _TYPES[part], int(number), ROWS[row])
+            return MissionItemInt(to, _type(part), int(number), ROWS[row])
         case ["request", part, number]:
-            return MissionRequestInt(vehicle, _TYPES[part], int(number))
+            return MissionRequestInt(to, _type(part), int(number))
         case ["list", part]:
-            return MissionRequestList(vehicle, _TYPES[part])
+            return MissionRequestList(to, _type(part))
         case ["clear", part]:
-            return MissionClearAll(vehicle, _TYPES[part])
+            return MissionClearAll(to, _type(part))
         case ["ack", part, result]:
-            return MissionAck(vehicle, _TYPES[part], MavResult[result])
-    raise ValueError(words)
+            return MissionAck(to, _type(part), MavResult[result])
+        case ["beat", kind, autopilot, flags]:
+            return Heartbeat(int(kind), int(autopilot), int(flags), 0, 4)
+        case ["text", *words]:
+            return Statustext(4, " ".join(words))
+    raise ValueError(text)
 
 
-def _written(message: Message) -> str:
+def written(message: Message) -> str:
+    """Return `message` in words."""
+    if isinstance(message, Statustext):
+        return f"text {message.text}"
     assert isinstance(message, ListMessage)
-    part = MissionType(message.mission_type).name.lower()
+    number = message.mission_type
+    part = next((each.name.lower() for each in MissionType if each == number), str(number))
     match message:
         case MissionCount():
             return f"count {part} {message.count}"
@@ -150,10 +167,11 @@ def _written(message: Message) -> str:
             values = " ".join(f"{value:.7g}" for value in (*item.params, item.z))
             plain = f"{item.command} {item.frame} {item.x} {item.y}"
             return f"item {part} {seq}: {plain} {values} {item.autocontinue}"
-    return type(message).__name__
+    return f"{'list' if isinstance(message, MissionRequestList) else 'clear'} {part}"
 
 
-_TYPES = {part.name.lower(): part for part in MissionType}
+def _type(part: str) -> int:
+    return int(part) if part.isdigit() else MissionType[part.upper()]
 
 
 def conversation(messages: list[Message], patience: float, expected: int) -> Talk[list[Message]]:
@@ -179,12 +197,15 @@ def renewed(kind: str, autopilots: Path, where: Path) -> str:
     with simulated(autopilots, kind, where) as connection, WireLink(connection) as link:
         (found,) = link.run(discover(patience=20.0)).vehicles
 
-        def talk(messages: list[Message], patience: float, expected: int) -> list[Message]:
+        def tell(line: str, expected: int) -> list[Message]:
             # What is said late, on a busy machine, is waited for.
-            return link.run(conversation(messages, max(patience, PATIENCE), expected))
+            silence = line.startswith("~")
+            sent = [] if silence else [parsed(line[2:], found.address)]
+            patience = max(float(line[2:]) if silence else 0.0, PATIENCE)
+            return link.run(conversation(sent, patience, expected))
 
         return "\n\n".join(
-            "\n".join([f"# {name}", *played(lines, talk, found.address)])
+            "\n".join([f"# {name}", *played(lines, tell)])
             for name, lines in exchanges(recorded(kind)).items()
         )
 

@@ -1,10 +1,11 @@
 """Whatever link or vehicle do: an upload is verified and right, or told as failed, and ends."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
+from exchanges import EXCHANGES, ROWS, exchanges, parsed, played
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulate import Station, simulate
@@ -33,13 +34,12 @@ from faao_mav.wire.jobs import explain, upload_parts
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import (
     Envelope,
-    Heartbeat,
+    Message,
     MissionAck,
     MissionCount,
     MissionItemInt,
     MissionRequestInt,
     MissionRequestList,
-    Statustext,
     WireItem,
 )
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
@@ -254,123 +254,71 @@ def test_what_a_channel_does() -> None:
     assert [channel.carry(b"abc", now)[0][0] for now in (1.0, 1.1, 9.0)] == [1.8, 2.1, 9.8]
 
 
-# ---- told by hand what a vehicle may say
+# ---- what it says by hand
 
-ME = GROUND_STATION
-ROWS = rows_for("px4", 9)
-CANCEL = MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
-ARMED = Heartbeat(2, 3, 128, 0, 4)
+BY_HAND = exchanges((EXCHANGES / "client.txt").read_text())
+SENT = [ROWS[name] for name in ("way", "other", *["way"] * 7)]
 
 
-def request(seq: int, target: Address = ME, part: int = 0) -> Any:
-    return MissionRequestInt(target, part, seq)
+def at_desk(job: str, firmware: str, count: str = "0") -> Desk:
+    """Return a desk with the client, which is to read a list or to upload so many items."""
+    peer = peer_of(firmware)
+    return Desk(Script(read_list(peer) if job == "read" else send_list(SENT[: int(count)], peer)))
 
 
-def ack(result: MavResult, target: Address = ME, part: int = 0) -> MissionAck:
-    return MissionAck(target, part, result)
+def on_desk(desk: Desk) -> Callable[[str, int], list[Message]]:
+    """Return what tells the client on a `desk` the lines of an exchange."""
+
+    def tell(line: str, _: int) -> list[Message]:
+        text, _, who = line[2:].partition(" | ")
+        which, *numbers = who.split() or ("",)
+        other = Address(*map(int, numbers)) if which else VEHICLE
+        match line[0]:
+            case "b":
+                return desk.start()
+            case "c":
+                return list(desk.machine.cancel(desk.now))
+            case "~":
+                return desk.wait(float(text))
+            case "=":
+                end, result = desk.machine.outcome, desk.machine.outcome.result
+                told = "no result" if result is None else MavResult(result).name
+                assert text == "; ".join([f"{end.verdict} at {end.item}, {told}", *end.said])
+                return []
+        sender = other if which == "from" else VEHICLE
+        return desk.tell(parsed(text, other if which == "to" else GROUND_STATION), sender)
+
+    return tell
 
 
-def item(seq: int, target: Address = ME, part: int = 0) -> MissionItemInt:
-    return MissionItemInt(target, part, seq, ROWS[seq])
-
-
-def uploading(firmware: str, count: int = 3, asked: int = 0) -> Desk:
-    """Return a desk at which `asked` of `count` items have been asked for."""
-    desk = Desk(Script(send_list(ROWS[:count], peer_of(firmware), MISSION)))
-    desk.start()
-    for seq in range(asked):
-        desk.tell(request(seq))
-    return desk
-
-
-def reading(firmware: str) -> Desk:
-    desk = Desk(Script(read_list(peer_of(firmware))))
-    assert desk.start() == [MissionRequestList(VEHICLE, 0)]
-    return desk
+@pytest.mark.parametrize("name", BY_HAND)
+def test_what_the_client_answers(name: str) -> None:
+    desk = at_desk(*name.partition(":")[0].split())
+    assert played(BY_HAND[name], on_desk(desk), ">") == BY_HAND[name]
 
 
 @BOTH
 def test_a_vehicle_that_asks_for_one_item_for_ever_is_given_up(kind: str) -> None:
-    desk = uploading(kind, asked=1)
-    assert [desk.tell(request(0)) for _ in range(200)] == [desk.sent[-1:]] * 200
-    while not desk.machine.outcome:
-        desk.wait(0.25)
-        desk.tell(request(0))
-        assert desk.now < 200
-    assert desk.sent[-1] == CANCEL
-    assert (desk.machine.outcome.verdict, desk.machine.outcome.item) == ("silent", 0)
-
-
-def test_the_last_words_of_a_vehicle_are_told_and_an_unknown_one_is_sent_nothing_unasked() -> None:
-    desk = uploading("generic", 9)
-    for seq in range(3):
-        desk.tell(request(seq))
-        assert desk.wait(8.0) == []
-    for k in range(7):
-        desk.tell(Statustext(4, f"no {k}"))
-    desk.tell(ack(MavResult.INVALID))
-    desk.wait(2.0)
-    assert desk.machine.outcome.said == ("no 2", "no 3", "no 4", "no 5", "no 6")
-
-
-def test_nothing_more_is_written_once_the_vehicle_is_armed() -> None:
-    for requests in (0, 2):
-        desk = uploading("px4", asked=requests)
-        assert desk.tell(Heartbeat(18, 8, 128, 0, 4), Address(1, 191)) == []  # a companion's flag
-        assert desk.tell(ARMED) == [CANCEL]
-        assert desk.machine.outcome.verdict == "armed"
-        assert desk.tell(request(requests)) == []
-        assert desk.wait(60) == []
-
-
-def test_what_is_said_to_others_or_about_other_lists_is_ignored() -> None:
-    """And an acceptance before the last item was asked for, and what was not asked for now."""
-    for message, sender in (
-        (request(0), FOREIGN),
-        (request(0), Address(1, 2)),
-        (request(0, FOREIGN), VEHICLE),
-        (request(0, part=1), VEHICLE),
-        (ack(MavResult.INVALID), FOREIGN),
-        (ack(MavResult.INVALID, FOREIGN), VEHICLE),
-        (ack(MavResult.INVALID, part=2), VEHICLE),
-        (ack(MavResult.ACCEPTED), VEHICLE),
-        (MissionCount(ME, 0, 3), VEHICLE),
-        (ARMED, Address(2, 1)),
-    ):
-        desk = uploading("px4")
-        assert desk.tell(message, sender) == []
-        desk.wait(0.1)
-        assert not desk.machine.outcome
-        assert desk.tell(request(0)) != []
-    desk = reading("generic")
-    for message in (MissionCount(FOREIGN, 0, 7), MissionCount(ME, 1, 7), item(0)):
-        assert desk.tell(message) == []
-    assert desk.tell(MissionCount(ME, 0, 7), FOREIGN) == []
-    desk.tell(MissionCount(ME, 0, 3))
-    for message in (item(0, FOREIGN), item(0, part=1), item(2), MissionCount(ME, 0, 3)):
-        assert desk.tell(message) == []
-    assert desk.tell(item(0)) == [MissionRequestInt(VEHICLE, 0, 1)]
-    assert desk.tell(item(0)) == []
-
-
-def test_either_end_may_give_up() -> None:
-    for desk in (uploading("px4"), uploading("px4", 0), reading("px4")):
-        assert desk.machine.cancel(desk.now) == [CANCEL]
-        assert desk.machine.cancel(desk.now) == []
-    desk = uploading("ardupilot", asked=1)
-    desk.tell(ack(MavResult.OPERATION_CANCELLED))
-    assert desk.machine.outcome.verdict == "cancelled"
+    desk = at_desk("upload", kind, "3")
+    tell = on_desk(desk)
+    tell("begin", 1)
+    for wait in (*["~ 0"] * 200, *["~ 0.25"] * 800):
+        tell("< request mission 0", 1)
+        if desk.machine.outcome is None:
+            tell(wait, 0)
+    assert desk.sent[-1] == MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
+    tell("= silent at 0, no result", 0)
 
 
 def test_a_download_that_is_always_ended_is_begun_anew_a_few_times() -> None:
     """As when a late request has ended it: PX4 says ERROR, and nothing more."""
-    desk = reading("px4")
-    for message in (MissionCount(ME, 0, 3), item(0), ack(MavResult.ERROR)):
-        desk.tell(message)
-    assert MissionRequestList(VEHICLE, 0) in desk.wait(2.5)
-    assert desk.tell(item(1)) == []  # late: of the transfer before
+    desk = at_desk("read", "px4")
+    tell = on_desk(desk)
+    for line in ("begin", "< count mission 3", "< item mission 0 way", "< ack mission ERROR"):
+        tell(line, 1)
+    assert MissionRequestList(VEHICLE, 0) in tell("~ 2.5", 1)
+    assert tell("< item mission 1 way", 0) == []  # late: of the transfer before
     for _ in range(100):
-        desk.wait(1.0)
-        desk.tell(ack(MavResult.ERROR))
-    outcome = desk.machine.outcome
-    assert (outcome.verdict, outcome.result) == ("refused", MavResult.ERROR)
+        tell("~ 1", 0)
+        tell("< ack mission ERROR", 0)
+    tell("= refused at None, ERROR", 0)

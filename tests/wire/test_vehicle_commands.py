@@ -31,8 +31,7 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(each) for each in arguments])
 
 
-def test_upload_and_download(tmp_path: Path) -> None:
-    """What ArduPilot does not keep is told once for each field; JSON is one object."""
+def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path) -> None:
     path, out = tmp_path / "m.waypoints", tmp_path / "back.plan"
     items = tuple(
         MissionItem(16, 3, (2.5, 0.0, 0.0, float("nan")), -35.36 + k * 1e-4, 149.16, 20.0)
@@ -40,34 +39,20 @@ def test_upload_and_download(tmp_path: Path) -> None:
     )
     path.write_text(write_wpl(Mission(items, HOME)))
     with vehicle() as (to, _):
-        result, as_json = (
-            run("upload", path, "--to", to, "--system", 1, *more) for more in ((), ("--json",))
-        )
-        assert (result.exit_code, result.stderr) == (0, ""), result.output
-        *told, kept, verified = result.stdout.splitlines()
-        assert told == [
-            "vehicle      ArduPilot copter (system 1, component 1, disarmed)",
-            "stands       0 m from the mission's home, 0 m higher",
-            "mission      4 items stored",
-        ]
-        lost = "mission item 0: param1 2.5 is kept as 2.0 (and so in 3 more items)"
-        assert kept == f"not kept     {lost}"
-        assert verified.startswith("verified     read back and compared; the upload took ")
-        result = run("download", "--from", to, "--out", out, "--system", 1)
-        assert result.exit_code == 0, result.output
-    assert "mission      4 items, 0 fence areas, 0 rally points" in result.stdout
-    found = read_mission(out)
-    assert found.home == HOME
-    assert json.loads(out.read_text())["mission"]["firmwareType"] == 3  # MAV_AUTOPILOT of ArduPilot
-    for kept_item, item in zip(found.items, items, strict=True):
-        assert (kept_item.x, kept_item.y, kept_item.z) == pytest.approx((item.x, item.y, item.z))
-    data = json.loads(as_json.stdout)
-    assert as_json.stdout.count("\n") == 1
-    assert (data["verified"], data["vehicle"]["autopilot"]) == (True, "ardupilot")
-    (mission,) = data["lists"]
+        sent = ("upload", path, "--to", to, "--system", 1)
+        result, data = run(*sent), run(*sent, "--json").stdout
+        held = run("download", "--from", to, "--out", out, "--system", 1).stdout
+    assert "mission      4 items, 0 fence areas, 0 rally points" in held
+    lost = "mission item 0: param1 2.5 is kept as 2.0 (and so in 3 more items)"
+    assert f"\nnot kept     {lost}\nverified     read back and compared; " in result.stdout
+    assert (result.stderr, data.count("\n")) == ("", 1)
+    (mission,) = json.loads(data)["lists"]
     assert (mission["list"], mission["items"], mission["verdict"]) == ("mission", 4, "verified")
     lost_field = {"item": 0, "field": "param1", "sent": 2.5, "found": 2.0, "kind": "dropped"}
     assert lost_field in mission["differences"]
+    assert json.loads(out.read_text())["mission"]["firmwareType"] == 3  # MAV_AUTOPILOT of ArduPilot
+    for kept, item in zip(read_mission(out).items, items, strict=True):
+        assert (kept.x, kept.y, kept.z) == pytest.approx((item.x, item.y, item.z))
 
 
 def test_a_refused_upload_is_status_1(tmp_path: Path) -> None:
@@ -75,13 +60,12 @@ def test_a_refused_upload_is_status_1(tmp_path: Path) -> None:
     path.write_text(write_wpl(a_mission(6)))
     with vehicle(refusals={(0, 3): MavResult.INVALID_PARAM7}) as (to, _):
         result = run("upload", path, "--to", to, "--system", 1)
-        large = put(a_mission(700), to, system=1)
+        (problem,) = put(a_mission(700), to, system=1).problems
     assert result.exit_code == 1
     assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
     assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
     assert "not verified; do not fly it" in result.stderr
     assert "verified     " not in result.stdout
-    (problem,) = large.problems
     assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
     assert "The vehicle says: Only 655 items are supported" in problem
 
