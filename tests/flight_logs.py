@@ -31,10 +31,7 @@ def kept(record: FlightRecord, which: Any) -> FlightRecord:
 
 
 def ulog(
-    record: FlightRecord,
-    *,
-    wind: Real | None = None,
-    parameters: Mapping[str, float] = _NONE,
+    record: FlightRecord, *, wind: Real | None = None, parameters: Mapping[str, float] = _NONE
 ) -> bytes:
     """Return a `.ulg`, which has a home where it is set or set again."""
 
@@ -55,24 +52,25 @@ def ulog(
     for number, name in enumerate(formats):
         out.append(message(b"A", struct.pack("<BH", 0, number) + name.encode()))
     last = math.nan
+
+    def add(layout: str, *values: Any) -> None:
+        out.append(message(b"D", struct.pack(layout, *values)))
+
     for k, (t, *place, set_home) in enumerate(_places(record)):
         time = round(t * 1e6)
         if set_home != last:
             last = set_home
-            out.append(message(b"D", struct.pack("<HQf?", 1, time, set_home, True)))
+            add("<HQf?", 1, time, set_home, True)
         if math.isfinite(record.rssi[k]):
-            out.append(message(b"D", struct.pack("<HQB", 3, time - 1, int(record.rssi[k]))))
-        out.append(message(b"D", struct.pack("<HQddf", 0, time, *place)))
+            add("<HQB", 3, time - 1, int(record.rssi[k]))
+        add("<HQddf", 0, time, *place)
         if wind is not None:
-            out.append(message(b"D", struct.pack("<HQff", 2, time, *wind[k, ::-1])))
+            add("<HQff", 2, time, *wind[k, ::-1])
     return b"".join(out)
 
 
 def dataflash(
-    record: FlightRecord,
-    *,
-    wind: Real | None = None,
-    parameters: Mapping[str, float] = _NONE,
+    record: FlightRecord, *, wind: Real | None = None, parameters: Mapping[str, float] = _NONE
 ) -> bytes:
     """Return a `.bin`."""
     formats = (

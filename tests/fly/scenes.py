@@ -154,14 +154,8 @@ def harmless(message: Message) -> bool:
     """Tell whether a message only asks for something."""
     asked = (MavCommand.SET_INTERVAL, MavCommand.REQUEST_MESSAGE)
     asks = isinstance(message, CommandLong) and message.command in asked
-    reads = (
-        messages.MissionRequestList
-        | messages.MissionRequestInt
-        | messages.MissionAck
-        | messages.ParamRequestRead
-        | messages.Timesync
-    )
-    return asks or isinstance(message, reads)
+    lists = messages.MissionRequestList | messages.MissionRequestInt | messages.MissionAck
+    return asks or isinstance(message, lists | messages.ParamRequestRead | messages.Timesync)
 
 
 PICKED: dict[str, Picks] = {
@@ -465,10 +459,17 @@ def lag(*_: float) -> Lens:
     return late
 
 
+def modeless(begin: float, end: float) -> Lens:
+    """Tell no modes, as where they come after positions when the link is back."""
+    modes = messages.Heartbeat | messages.CurrentMode
+    return lambda said, now: [said][isinstance(said, modes) and begin <= now < end :]
+
+
 LENSES: dict[str, Callable[..., Lens]] = {
     "blind": blind,
     "hold-up": hold_up,
     "lag": lag,
+    "modeless": modeless,
     "jump": positions(lambda p, _, north: replace(p, lat=p.lat + round(north * METRE))),
     "stuck": positions(lambda p, first: replace(first, time_boot_ms=p.time_boot_ms)),
     "leap": positions(

@@ -56,8 +56,7 @@ def debriefed(log: Path, autopilot: str, system: int = 0) -> FromLog:
 @cache
 def flown() -> FlightRecord:
     """Return the flight in `px4.tlog`."""
-    (record,) = records(LOGS / "px4.tlog")
-    return record
+    return records(LOGS / "px4.tlog")[0]
 
 
 @pytest.fixture(scope="module")
@@ -67,17 +66,15 @@ def flight() -> FlightRecord:
 
 
 def test_both_logs_of_a_flight_tell_the_same() -> None:
-    own, heard = (
-        debriefed(LOGS / f"arducopter.{kind}", "ardupilot").as_dict() for kind in ("bin", "tlog")
-    )
+    kinds = ("bin", "tlog")
+    own, told = (debriefed(LOGS / f"arducopter.{x}", "ardupilot").as_dict() for x in kinds)
     for name in ("rate_bs_uav", "rate_uav_user", "delivered_rate", "duration"):
-        assert own["flown"][name] == pytest.approx(heard["flown"][name], rel=1e-3)
-    off = heard["flown"]["rms_position_error"]
+        assert own["flown"][name] == pytest.approx(told["flown"][name], rel=1e-3)
+    off = told["flown"]["rms_position_error"]
     assert own["flown"]["rms_position_error"] == pytest.approx(off, abs=0.1)
     assert off < 3
-    assert own["flown"]["delivered_rate"] == pytest.approx(
-        own["planned"]["delivered_rate"], rel=2e-3
-    )
+    planned_rate = own["planned"]["delivered_rate"]
+    assert own["flown"]["delivered_rate"] == pytest.approx(planned_rate, rel=2e-3)
     assert "WPNAV_SPEED" not in own["parameters"]
     assert own["wind"] is None  # ArduCopter that is not told its drag logs zeros
     assert own["missing"] == 0
@@ -196,15 +193,15 @@ def test_boots_in_one_log_stand_one_after_the_other(tmp_path: Path) -> None:
 
 def test_what_is_no_log_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     for name, content, told in (
+        ("flight.bin", None, "no such file"),
         ("flight.csv", b"1,2", "give a flight log: .bin, .tlog, .ulg"),
         ("flight.bin", b"", "empty"),
         ("flight.bin", b"no log at all" * 100, "0 positions"),
         ("flight.ulg", b"no log at all" * 100, "not a .ulg log"),
     ):
         path = tmp_path / name
-        with pytest.raises(InputError, match="no such file"):
-            read_log(tmp_path / f"missing{path.suffix}")
-        path.write_bytes(content)
+        if content is not None:
+            path.write_bytes(content)
         with pytest.raises(InputError, match=told):
             read_log(path)
         assert capfd.readouterr() == ("", "")
@@ -287,14 +284,11 @@ def test_heights_are_above_home_as_it_was_then(kind: str) -> None:
     assert record.home[[29, 30]] == pytest.approx([500.0, 506.0])
 
 
-def test_a_home_that_comes_late_or_never() -> None:
+def test_a_home_that_comes_late_or_never_and_a_clock_that_runs_for_days() -> None:
     said = [position(KINDS[2], k, float(k), 500.0) for k in range(POSITIONS)]
     assert heights(made_of(said)) == pytest.approx(np.arange(POSITIONS))
     later: list[Said] = [*said[:20], (0, 0, "home_position", {"alt": 490.0}), *said[20:]]
     assert heights(made_of(later)) == pytest.approx(10.0 + np.arange(POSITIONS))
-
-
-def test_a_clock_that_runs_for_days_is_refused() -> None:
     said = [position(KINDS[0], 4500 * k, 20.0, 500.0) for k in range(POSITIONS + 50)]
     with pytest.raises(InputError, match="27 hours"):
         made_of(said)

@@ -192,22 +192,6 @@ def mission(tmp_path: Path) -> Path:
     return path
 
 
-def test_an_upload_says_where_the_vehicle_stands(mission: Path) -> None:
-    with vehicle(home=away(1_500.0, -32.0)) as (to, _):
-        result = run("upload", mission, "--to", to)
-        assert result.exit_code == 0, result.output
-        stands = "stands       1500 m from the mission's home, 32 m lower: it is not armed there"
-        assert stands in result.stdout.splitlines()
-        told = json.loads(run("upload", mission, "--to", to, "--json").stdout)
-    assert told["stands"]["from_home"] == pytest.approx(1500, abs=1)
-    assert told["stands"]["higher"] == pytest.approx(-32, abs=0.1)
-    assert told["stands"]["is_meant"] is False
-    with vehicle(place=1e9) as (to, _):
-        result = run("upload", mission, "--to", to)
-        assert result.exit_code == 0, result.output
-        assert "stands       not known how far from the mission's home" in result.stdout
-
-
 def test_a_mission_for_another_vehicle_is_not_uploaded(tmp_path: Path) -> None:
     plan, beside = tmp_path / "m.plan", tmp_path / "w.waypoints"
     plan.write_text(render_mission(a_mission(6), plan, PlanTarget(firmware=3, vehicle_type=20)))
@@ -244,9 +228,11 @@ def test_no_parameters_are_set_but_the_missions_own(mission: Path) -> None:
 
 def test_nothing_is_armed_past_the_gate_but_what_an_option_overrules(mission: Path) -> None:
     """It stands elsewhere, and another mission has left its fence and rally points."""
-    with vehicle(home=away(200.0), speedup=60.0, parameters={"FENCE_ENABLE": 0}) as (to, mock):
+    home, fenceless = away(200.0, -8.0), {"FENCE_ENABLE": 0}
+    with vehicle(home=home, speedup=60.0, parameters=fenceless) as (to, mock):
         assert upload(a_mission(5, fence=FENCE, rally=RALLY), to).verified
-        assert run("upload", mission, "--to", to).exit_code == 0
+        stands = "stands       200 m from the mission's home, 8 m lower: it is not armed there\n"
+        assert stands in run("upload", mission, "--to", to).stdout
         result = run("fly", mission, "--to", to, "--arm")
         assert result.exit_code == 1
         for told in (
@@ -256,11 +242,16 @@ def test_nothing_is_armed_past_the_gate_but_what_an_option_overrules(mission: Pa
         ):
             assert told in result.stdout
         assert not mock.armed
-        result = run("upload", mission, "--to", to, "--clear-rest")
-        assert result.exit_code == 0, result.output
+        result = run("upload", mission, "--to", to, "--clear-rest", "--json")
+        place = json.loads(result.stdout)["stands"]
+        assert (place["from_home"], place["higher"]) == pytest.approx((200, -8), abs=1)
+        assert place["is_meant"] is False
         assert mock.mission() == Mission(mock.mission().items, mock.mission().home)
         result = run("fly", mission, "--to", to, "--arm", "--elsewhere", "--json")
         assert result.exit_code == 0, result.output
         end = json.loads(result.stdout.splitlines()[-1])
         (here,) = (each for each in end["findings"] if each["rule"] == "place-home")
         assert (here["level"], here["action"]) == ("warning", "--elsewhere: flown all the same")
+    with vehicle(place=1e9) as (to, _):
+        told = run("upload", mission, "--to", to).stdout
+        assert "stands       not known how far from the mission's home" in told

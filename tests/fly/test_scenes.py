@@ -14,11 +14,11 @@ A line of `tests/data/fly/scenes.txt` has three parts between bars. The first na
 The second tells what happens at a time or in a time, s: somebody else sets a mode or gives an
 order, packets are `silence`, some messages are lost (`loses`) or only their answers (`mutes`), all
 that the vehicle says waits for the end of a `hold-up`, it denies arming (`unready`), tells the item
-under way late (`lag`), positions are changed. The third has the kind of the ending, "-" for none,
-and what holds then: what was told (`says`), the ending's `text`, the gate's findings (`finds`),
-modes, orders; `quiet`: nothing that moves it is sent from then on, `unmoved`: no setpoint;
-`cancelled`: the last word ends a transfer. Nothing
-is sent in any scene that its `Judge` calls wrong.
+under way late (`lag`) or no mode (`modeless`), positions are changed. The third has the kind of the
+ending, "-" for none, and what holds then: what was told (`says`), the ending's `text`, the gate's
+findings (`finds`), modes, orders; `quiet`: nothing that moves it is sent from then on, `unmoved`:
+no setpoint; `cancelled`: the last word ends a transfer. Nothing is sent in any scene that its
+`Judge` calls wrong.
 """
 
 from collections.abc import Iterator

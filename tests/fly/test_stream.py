@@ -107,18 +107,6 @@ def test_what_others_asked_tells_nothing_of_the_link() -> None:
     assert clock.lead == pytest.approx(0.2)
 
 
-def test_a_pilot_who_sets_the_failsafes_own_mode_while_it_is_silent_has_it() -> None:
-    """It was in that mode for want of setpoints before: the last that was heard is a failsafe."""
-    happens = "44-48.5 loses setpoints; 47-50 silence; 48 hold; 70 land"
-    scene = staged("swift", "px4", {"COM_OBL_RC_ACT": "5"}, happens)
-    modes = messages.Heartbeat | messages.CurrentMode
-    # These come after positions, when the link is back.
-    scene.tells(lambda message, now: [message][isinstance(message, modes) and 50.0 <= now < 51.0 :])
-    assert scene.run() == "taken over"
-    assert any("it is in its failsafe" in text for text in scene.watch.seen.told)
-    assert scene.after(50.0) == 0
-
-
 def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:
     """The link breaks as setpoints end, and PX4 goes into its failsafe: it lands all the same."""
     scene = Scene("px4", solution=under({}), parameters={"COM_OBL_RC_ACT": 5})
@@ -226,17 +214,16 @@ def test_it_meets_the_plan_where_that_waits() -> None:
 
 
 def test_an_aircraft_that_does_not_follow_is_given_up() -> None:
-    """It stays where it is, or a wind drifts it off again and again."""
-    for drift in (0.0, -8.0):
-        solution, t, place = planned("swift"), 0.0, np.array([0.0, 0.0, 30.0])
-        flight = Itinerary(solution, print, takes_off=True)
-        while flight.trouble is None and flight.part != "over" and t < 900:
-            t += 0.1
-            setpoint = flight.setpoint(t, place, np.zeros(3))
-            assert setpoint is None or np.linalg.norm(setpoint.position - place) <= CAP
-            place = place + np.array([0.0, drift / 10, 0.0])
-        assert flight.trouble == "it does not follow"
-        assert t < 120
+    """A wind drifts it off again and again; scenes have one that stays where it is."""
+    t, place = 0.0, np.array([0.0, 0.0, 30.0])
+    flight = Itinerary(planned("swift"), print, takes_off=True)
+    while flight.trouble is None and flight.part != "over" and t < 900:
+        t += 0.1
+        setpoint = flight.setpoint(t, place, np.zeros(3))
+        assert setpoint is None or np.linalg.norm(setpoint.position - place) <= CAP
+        place = place - [0.0, 0.8, 0.0]
+    assert flight.trouble == "it does not follow"
+    assert t < 120
 
 
 def test_a_course_is_what_its_pieces_add_up_to() -> None:

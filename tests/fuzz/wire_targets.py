@@ -7,7 +7,7 @@ bytes, big-endian.
 import json
 import math
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from random import Random
 from typing import Any
 
@@ -24,21 +24,11 @@ from faao_mav.mission import Mission, MissionItem
 from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
+from faao_mav.wire import messages
 from faao_mav.wire.codec import Codec, Framer, message_id
 from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.jobs import UploadReport, download_lists, explain, upload_parts
 from faao_mav.wire.machine import Machine, Script, Talk, ask_alive, ask_for
-from faao_mav.wire.messages import (
-    CommandLong,
-    HomePosition,
-    MissionRequestInt,
-    MissionRequestList,
-    ParamRequestRead,
-    ParamSet,
-    SetMode,
-    Statustext,
-    Timesync,
-)
 from faao_mav.wire.protocol import GROUND_STATION, HOME_POSITION, MavCommand, MissionType
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer import Peer
@@ -99,8 +89,8 @@ def tell(machine: Machine[Any], codec: Codec, datagram: bytes, now: float) -> No
     packed(codec, machine.tick(now))
 
 
-def packed(codec: Codec, messages: Sequence[Any]) -> list[bytes]:
-    return [codec.pack(message) for message in messages]
+def packed(codec: Codec, said: Iterable[Any]) -> list[bytes]:
+    return [codec.pack(message) for message in said]
 
 
 def mutated(tape: bytes, others: Sequence[bytes], random: Random) -> bytes:
@@ -141,13 +131,13 @@ _MISSION = Mission(_ITEMS, HOME, FENCE, RALLY)
 """What is uploaded: some of each list."""
 
 _COMMANDS = (
-    SetMode(1, 1, 0),
-    ParamRequestRead(VEHICLE, "WPNAV_SPEED", -1),
-    ParamSet(VEHICLE, "WPNAV_SPEED", 500.0, 9),
-    CommandLong(VEHICLE, MavCommand.SET_MODE, 0, 1.0, 4.0, 4.0),
-    CommandLong(VEHICLE, MavCommand.REQUEST_MESSAGE, 0, 148.0),
-    CommandLong(VEHICLE, MavCommand.REBOOT, 0, 1.0),
-    Timesync(0, 1),
+    messages.SetMode(1, 1, 0),
+    messages.ParamRequestRead(VEHICLE, "WPNAV_SPEED", -1),
+    messages.ParamSet(VEHICLE, "WPNAV_SPEED", 500.0, 9),
+    messages.CommandLong(VEHICLE, MavCommand.SET_MODE, 0, 1.0, 4.0, 4.0),
+    messages.CommandLong(VEHICLE, MavCommand.REQUEST_MESSAGE, 0, 148.0),
+    messages.CommandLong(VEHICLE, MavCommand.REBOOT, 0, 1.0),
+    messages.Timesync(0, 1),
 )
 """What ground stations say beside the mission protocol."""
 
@@ -164,7 +154,7 @@ def wire_targets() -> dict[str, Target]:
             return _serve(kind, content)
 
         found.append(Target(f"mock_{kind}", serve, [tape], mutated))
-    genuine = packed(Codec(VEHICLE, _signing()), [Statustext(6, f"{n}") for n in range(20)])
+    genuine = packed(Codec(VEHICLE, _signing()), map(_said, range(20)))
     found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
     return {target.name: target for target in found}
 
@@ -184,7 +174,7 @@ def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
 
 def _asks(peer: Peer) -> Talk[list[object]]:
     alive = yield from ask_alive(peer.address, 1)
-    return [alive, (yield from ask_for(peer.address, HOME_POSITION, HomePosition))]
+    return [alive, (yield from ask_for(peer.address, HOME_POSITION, messages.HomePosition))]
 
 
 def _session(kind: MockKind) -> tuple[bytes, bytes]:
@@ -238,10 +228,10 @@ def _serve(kind: MockKind, tape: bytes) -> object:
     mock, vehicle, station = _mock(kind), Codec(VEHICLE), Codec(GROUND_STATION)
     packed(vehicle, mock.start(0.0))
     asked = [
-        CommandLong(VEHICLE, MavCommand.ARM, 0, 1.0),
-        CommandLong(VEHICLE, MavCommand.START, 0),
-        *(MissionRequestList(VEHICLE, part) for part in MissionType),
-        *(MissionRequestInt(VEHICLE, part, 0) for part in MissionType),
+        messages.CommandLong(VEHICLE, MavCommand.ARM, 0, 1.0),
+        messages.CommandLong(VEHICLE, MavCommand.START, 0),
+        *(messages.MissionRequestList(VEHICLE, part) for part in MissionType),
+        *(messages.MissionRequestInt(VEHICLE, part, 0) for part in MissionType),
     ]
     heard = [*datagrams(tape), *packed(station, asked)]
     for number, datagram in enumerate(heard, start=1):
@@ -255,6 +245,11 @@ def _serve(kind: MockKind, tape: bytes) -> object:
 def _signing() -> Signing:
     """Return a key, at a time that stands still: a tape stays what it was."""
     return Signing(bytes(range(32)), clock=lambda: 1_800_000_000.0)
+
+
+def _said(number: int) -> messages.Message:
+    heartbeat = messages.Heartbeat(2, 12, 0, 0, 3)
+    return heartbeat if number % 3 else messages.Statustext(6, f"number {number}")
 
 
 def _take(tape: bytes, genuine: Sequence[bytes]) -> object:

@@ -1,12 +1,12 @@
 """What real autopilots make of missions.
 
-    FAAO_AUTOPILOTS=FOLDER python tests/real_autopilots/record_verdicts.py [--seconds S] [NAME ...]
+    FAAO_AUTOPILOTS=FOLDER python tests/real_autopilots/record_verdicts.py [NAME ...]
 
 Each mission in `tests/data/verdicts/`, where each vehicle has a file, is uploaded to a simulated
 autopilot and, if it is accepted, flown; what became of it is written there. A new one is added by
 hand, as its parameters, its items (how often, command, frame, param1 to param4, x, y, z,
-autocontinue; null is NaN) and perhaps the corners of a fence to stay in. Without names those
-missions are flown that have no verdict; `--seconds` ends the work in time, to be taken up again.
+autocontinue; null is NaN) and perhaps the corners of a fence to stay in. Without names, VEHICLE or
+VEHICLE/NAME, those missions are flown that have no verdict.
 
 A mission has taken off and come to its end (`flown`), or not:
 `refused` on upload; `rejected` by PX4 after it has acknowledged the upload; `not armed`;
@@ -15,7 +15,6 @@ way to a waypoint; `stuck`: in the air, and not at the last item, when the watch
 early`: before the last item.
 """
 
-import argparse
 import csv
 import importlib.util
 import json
@@ -24,7 +23,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -233,26 +231,17 @@ def write(vehicle: str, missions: dict[str, Any]) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help="fly these again, VEHICLE or VEHICLE/NAME")
-    parser.add_argument("--seconds", type=float, default=math.inf, help="begin none after that")
-    options = parser.parse_args()
-    folder, end = Path(os.environ["FAAO_AUTOPILOTS"]), time.monotonic() + options.seconds
-    left = 0
+    folder, chosen = Path(os.environ["FAAO_AUTOPILOTS"]), set(sys.argv[1:])
     for vehicle in SPEEDUP:
         missions = json.loads((DATA / f"{vehicle}.json").read_text())
         for name, mission in missions.items():
-            asked = {vehicle, f"{vehicle}/{name}"} & set(options.names)
-            if not asked and (options.names or "verdict" in mission):
-                continue
-            if time.monotonic() > end:
-                left += 1
+            asked = {vehicle, f"{vehicle}/{name}"} & chosen
+            if not asked and (chosen or "verdict" in mission):
                 continue
             kept = {key: mission[key] for key in ("parameters", "fence", "items") if key in mission}
             missions[name] = became = kept | run(folder, vehicle, mission)
             print(vehicle, name, became["verdict"], became["said"], flush=True)
             write(vehicle, missions)
-    print(f"{left} left")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
 """Mock autopilots take and give lists as real ones did, and what no recorded exchange shows."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
 import pytest
-from exchanges import EXCHANGES, exchanges, parsed, played, recorded, written
-from stations import FOREIGN, HOME, VEHICLE, Desk, a_mission, vehicle_of
+from exchanges import EXCHANGES, at_desk, exchanges, played, recorded, written
+from stations import HOME, VEHICLE, Desk, a_mission, vehicle_of
 
 from faao_mav.autopilot.ardupilot import ARDUPILOT
 from faao_mav.autopilot.px4 import PX4, px4_mode
@@ -48,30 +48,11 @@ def only(said: Sequence[Message], kind: type[T]) -> list[T]:
 # ---- lists
 
 
-def on_desk(desk: Desk) -> Callable[[str, int], list[Message]]:
-    """Return what tells the mock on a `desk` the lines of an exchange."""
-
-    def tell(line: str, _: int) -> list[Message]:
-        if line.startswith("~"):
-            said = desk.wait(float(line[2:]))
-        else:
-            said = desk.tell(parsed(line[2:], VEHICLE), FOREIGN if line[0] == "&" else None)
-        return [each for each in said if isinstance(each, messages.ListMessage | Statustext)]
-
-    return tell
-
-
-@pytest.mark.parametrize(
-    ("kind", "aircraft", "real"),
-    [
-        ("ardupilot", "copter", "arducopter"),
-        ("ardupilot", "plane", "arduplane"),
-        ("px4", "copter", "px4"),
-    ],
-)
-def test_the_mock_answers_as_the_real_one(kind: MockKind, aircraft: str, real: str) -> None:
-    desk = desk_for(kind, aircraft=aircraft, rate=0.0)
-    tell = on_desk(desk)
+@pytest.mark.parametrize("real", ["arducopter", "arduplane", "px4"])
+def test_the_mock_answers_as_the_real_one(real: str) -> None:
+    kind: MockKind = "px4" if real == "px4" else "ardupilot"
+    aircraft = "plane" if real == "arduplane" else "copter"
+    tell = at_desk(desk_for(kind, aircraft=aircraft, rate=0.0), VEHICLE)
 
     def about_lists(line: str, expected: int) -> list[Message]:
         return only(tell(line, expected), messages.ListMessage)
@@ -83,16 +64,20 @@ def test_the_mock_answers_as_the_real_one(kind: MockKind, aircraft: str, real: s
 @pytest.mark.parametrize("name", BY_HAND)
 def test_the_mock_answers_what_no_real_one_was_asked(name: str) -> None:
     kind: Any = name.partition(":")[0]
-    assert played(BY_HAND[name], on_desk(desk_for(kind))) == BY_HAND[name]
+    assert played(BY_HAND[name], at_desk(desk_for(kind), VEHICLE)) == BY_HAND[name]
 
 
 def test_lists_come_after_booting_and_what_is_prescribed_before_what_it_does_by_itself() -> None:
     """In its exchanges a mock is ready, and answers for itself."""
     desk = desk_for("ardupilot", boot=5.0)
     for answer in ("ack mission NO_SPACE", "request mission 0 legacy"):
-        assert [written(each) for each in on_desk(desk)("> count mission 3", 1)] == [answer]
+        assert [written(each) for each in at_desk(desk, VEHICLE)("> count mission 3", 1)] == [
+            answer
+        ]
         desk.wait(5.1)
-    tell = on_desk(desk_for("px4", refusals={(MissionType.MISSION, 0): MavResult.INVALID_PARAM3}))
+    tell = at_desk(
+        desk_for("px4", refusals={(MissionType.MISSION, 0): MavResult.INVALID_PARAM3}), VEHICLE
+    )
     tell("> count mission 1", 1)
     assert [written(each) for each in tell("> item mission 0 way", 1)] == [
         "ack mission INVALID_PARAM3"

@@ -12,10 +12,9 @@ station sends, `~ SECONDS` is silence of it, and the lines `< ...` after it are 
     beat 2 3 128                 HEARTBEAT: type, autopilot, flags
     text WORDS                   STATUSTEXT
 
-Two files are made by hand. In `mock.txt` lines `& ...` come from another ground station. In
-`client.txt` the vehicle speaks first: lines `< ...` are what it says, `FROM < ...` who else says
-it and `TO` whom it says it to, if not to us; the lines `> ...` after it are what the client says,
-and `= ...` how its job ends.
+Two files are made by hand, `mock.txt` and `client.txt`, in which `< ...` is what the vehicle says,
+the lines `> ...` after it are the answers of the client, and `= ...` is how its job ends. Behind a
+bar stands `from` or `to` whom else, by system and component.
 
 `python tests/wire/exchanges.py arducopter` (or arduplane, px4) writes the answers of a real one
 into the file. Each line waits for as many answers as the file has: what is new needs two runs.
@@ -32,24 +31,13 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from simulators import simulated
+from stations import Desk
 
+from faao_mav.wire import messages
 from faao_mav.wire.discover import discover
 from faao_mav.wire.link import WireLink
 from faao_mav.wire.machine import AT_ONCE, Talk
-from faao_mav.wire.messages import (
-    Heartbeat,
-    ListMessage,
-    Message,
-    MissionAck,
-    MissionClearAll,
-    MissionCount,
-    MissionItemInt,
-    MissionRequest,
-    MissionRequestInt,
-    MissionRequestList,
-    Statustext,
-    WireItem,
-)
+from faao_mav.wire.messages import Message, WireItem
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
 
 EXCHANGES = Path(__file__).parent.parent / "data" / "exchanges"
@@ -126,63 +114,89 @@ def played(
     return out
 
 
+def at_desk(desk: Desk, to: Address) -> Callable[[str, int], list[Message]]:
+    """Return what tells the machine on a `desk`, at the address `to`, the lines of an exchange."""
+
+    def tell(line: str, _: int) -> list[Message]:
+        text, _, who = line[2:].partition(" | ")
+        which, *numbers = who.split() or ("",)
+        whom = {which: Address(*map(int, numbers))} if which else {}
+        match line[0]:
+            case "b":
+                said = desk.start()
+            case "c":
+                said = desk.machine.cancel(desk.now)
+            case "~":
+                said = desk.wait(float(text))
+            case "=":
+                end, said = desk.machine.outcome, ()
+                result = "no result" if end.result is None else MavResult(end.result).name
+                assert text == "; ".join([f"{end.verdict} at {end.item}, {result}", *end.said])
+            case _:
+                said = desk.tell(parsed(text, whom.get("to", to)), whom.get("from"))
+        kinds = messages.ListMessage | messages.Statustext
+        return [each for each in said if isinstance(each, kinds)]
+
+    return tell
+
+
 def parsed(text: str, to: Address) -> Message:
     """Return the message that `text` says."""
     match text.split():
         case ["count", part, number]:
-            return MissionCount(to, _type(part), int(number))
+            return messages.MissionCount(to, _type(part), int(number))
         case ["item", part, number, row]:
-            return MissionItemInt(to, _type(part), int(number), ROWS[row])
+            return messages.MissionItemInt(to, _type(part), int(number), ROWS[row])
         case ["request", part, number]:
-            return MissionRequestInt(to, _type(part), int(number))
+            return messages.MissionRequestInt(to, _type(part), int(number))
         case ["list", part]:
-            return MissionRequestList(to, _type(part))
+            return messages.MissionRequestList(to, _type(part))
         case ["clear", part]:
-            return MissionClearAll(to, _type(part))
+            return messages.MissionClearAll(to, _type(part))
         case ["ack", part, result]:
-            return MissionAck(to, _type(part), MavResult[result])
+            return messages.MissionAck(to, _type(part), MavResult[result])
         case ["beat", kind, autopilot, flags]:
-            return Heartbeat(int(kind), int(autopilot), int(flags), 0, 4)
+            return messages.Heartbeat(int(kind), int(autopilot), int(flags), 0, 4)
         case ["text", *words]:
-            return Statustext(4, " ".join(words))
+            return messages.Statustext(4, " ".join(words))
     raise ValueError(text)
 
 
 def written(message: Message) -> str:
     """Return `message` in words."""
-    if isinstance(message, Statustext):
+    if isinstance(message, messages.Statustext):
         return f"text {message.text}"
-    assert isinstance(message, ListMessage)
+    assert isinstance(message, messages.ListMessage)
     number = message.mission_type
     part = next((each.name.lower() for each in MissionType if each == number), str(number))
     match message:
-        case MissionCount():
+        case messages.MissionCount():
             return f"count {part} {message.count}"
-        case MissionRequestInt():
-            legacy = " legacy" * isinstance(message, MissionRequest)
+        case messages.MissionRequestInt():
+            legacy = " legacy" * isinstance(message, messages.MissionRequest)
             return f"request {part} {message.seq}{legacy}"
-        case MissionAck():
+        case messages.MissionAck():
             return f"ack {part} {MavResult(message.type).name}"
-        case MissionItemInt(seq=seq, item=item):
+        case messages.MissionItemInt(seq=seq, item=item):
             values = " ".join(f"{value:.7g}" for value in (*item.params, item.z))
             plain = f"{item.command} {item.frame} {item.x} {item.y}"
             return f"item {part} {seq}: {plain} {values} {item.autocontinue}"
-    return f"{'list' if isinstance(message, MissionRequestList) else 'clear'} {part}"
+    return f"{'list' if isinstance(message, messages.MissionRequestList) else 'clear'} {part}"
 
 
 def _type(part: str) -> int:
     return int(part) if part.isdigit() else MissionType[part.upper()]
 
 
-def conversation(messages: list[Message], patience: float, expected: int) -> Talk[list[Message]]:
+def conversation(said: list[Message], patience: float, expected: int) -> Talk[list[Message]]:
     """Send messages once, and return what is said about lists to it."""
     line = yield AT_ONCE
-    line.say(*messages)
+    line.say(*said)
     heard, until = list[Message](), line.now + (patience if expected else QUIET)
     while line.now < until and (not expected or len(heard) < expected):
         line = yield until
         message = None if line.heard is None else line.heard.message
-        if isinstance(message, ListMessage) and message.target == GROUND_STATION:
+        if isinstance(message, messages.ListMessage) and message.target == GROUND_STATION:
             heard.append(message)
     return heard
 

@@ -3,8 +3,8 @@
 import heapq
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from itertools import count
+from dataclasses import dataclass
+from itertools import count, permutations
 from typing import Any
 
 from faao_mav.sim.faults import Channel, Faults
@@ -27,7 +27,6 @@ class Station:
 class _Node:
     station: Station
     codec: Codec
-    channels: dict[int, Channel] = field(default_factory=dict)
     ticked: float = -1.0
 
     def due(self) -> float | None:
@@ -59,9 +58,8 @@ def simulate(
     """
     faults = faults or Faults()
     nodes = [_Node(station, Codec(station.address)) for station in (client, server, *others)]
-    for sender, node in enumerate(nodes):
-        for receiver in range(len(nodes)):
-            node.channels[receiver] = Channel(faults, f"{sender} to {receiver}")
+    pairs = permutations(range(len(nodes)), 2)
+    channels = {pair: Channel(faults, "{} to {}".format(*pair)) for pair in pairs}
     order = count()
     queue: list[tuple[float, int, int, bytes]] = []
     passed = Counter[tuple[int, int, int]]()
@@ -70,13 +68,13 @@ def simulate(
     def send(sender: int, messages: Sequence[Message], now: float) -> None:
         for message in messages:
             packet = nodes[sender].codec.pack(message)
-            for receiver in range(len(nodes)):
-                if receiver == sender:
+            number = message_id(packet)
+            for (start, receiver), channel in channels.items():
+                if start != sender:
                     continue
-                number = message_id(packet)
                 passed[sender, receiver, number] += 1
                 if (number, passed[sender, receiver, number]) != lost:
-                    for time, arriving in nodes[sender].channels[receiver].carry(packet, now):
+                    for time, arriving in channel.carry(packet, now):
                         heapq.heappush(queue, (time, next(order), receiver, arriving))
 
     now = 0.0
@@ -99,16 +97,13 @@ def simulate(
             if tapes is not None:
                 tapes[receiver].append(packet)
             node = nodes[receiver]
-            for envelope in _read(node.codec, packet):
-                if receiver == 0 and heard is not None:
+            for envelope in (found.envelope for found in node.codec.parse(packet)):
+                if receiver == 0 and heard is not None and envelope is not None:
                     heard(envelope, now)
-                send(receiver, node.station.machine.on(envelope, now), now)
+                if envelope is not None:
+                    send(receiver, node.station.machine.on(envelope, now), now)
         else:
             index = min(due)[1]
             nodes[index].ticked = now
             send(index, nodes[index].station.machine.tick(now), now)
     return now
-
-
-def _read(codec: Codec, packet: bytes) -> list[Envelope]:
-    return [found.envelope for found in codec.parse(packet) if found.envelope is not None]

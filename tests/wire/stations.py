@@ -34,9 +34,7 @@ RALLY = (RallyPoint(-35.36, 149.16, 30.0), RallyPoint(-35.37, 149.17, 40.0))
 
 def vehicle_of(kind: str) -> VehicleType | None:
     """Return the copter of a kind of mock autopilot; None for "generic"."""
-    if kind == "generic":
-        return None
-    return vehicle_type("ardupilot" if kind == "ardupilot" else "px4", "copter")
+    return None if kind == "generic" else vehicle_type(kind, "copter")
 
 
 def peer_of(kind: str) -> Peer:
@@ -45,13 +43,10 @@ def peer_of(kind: str) -> Peer:
 
 def hurry(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have transfers given up soon; on a busy machine a mock may need a second to answer."""
-    for name, value in (
-        ("machine.SILENCE", 2.0),
-        ("transfer.SILENCE", 2.0),
-        ("transfer.ATTEMPTS", 1),
-        ("jobs.ATTEMPTS", 1),
-    ):
-        monkeypatch.setattr(f"faao_mav.wire.{name}", value)
+    for module in ("machine", "transfer"):
+        monkeypatch.setattr(f"faao_mav.wire.{module}.SILENCE", 2.0)
+    for module in ("transfer", "jobs"):
+        monkeypatch.setattr(f"faao_mav.wire.{module}.ATTEMPTS", 1)
 
 
 def signing_key(phrase: str) -> bytes:

@@ -1,11 +1,11 @@
 """Whatever link or vehicle do: an upload is verified and right, or told as failed, and ends."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from exchanges import EXCHANGES, ROWS, exchanges, parsed, played
+from exchanges import EXCHANGES, ROWS, at_desk, exchanges, played
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulate import Station, simulate
@@ -30,19 +30,11 @@ from stations import (
 from faao_mav.sim import COUNT, MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Channel, Faults
 from faao_mav.sim.storage import StoredLists
+from faao_mav.wire import messages
 from faao_mav.wire.jobs import explain, upload_parts
 from faao_mav.wire.machine import Script
-from faao_mav.wire.messages import (
-    Envelope,
-    Message,
-    MissionAck,
-    MissionCount,
-    MissionItemInt,
-    MissionRequestInt,
-    MissionRequestList,
-    WireItem,
-)
-from faao_mav.wire.protocol import GROUND_STATION, Address, MavResult, MissionType
+from faao_mav.wire.messages import Envelope, WireItem
+from faao_mav.wire.protocol import GROUND_STATION, MavResult, MissionType
 from faao_mav.wire.transfer import TENTATIVE, Peer, read_list, send_list
 from faao_mav.wire.wire_items import wire_items
 
@@ -142,8 +134,11 @@ def test_a_quick_link_is_quick_and_a_slow_one_is_not_flooded(
         stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
         seconds -= simulate(*stations, faults, until=2000.0)
         assert client.outcome.verdict in ("accepted", "unknown")
-        sent = sum(isinstance(each, MissionItemInt | MissionRequestInt) for each in client.sent)
-        asked = sum(isinstance(each, MissionRequestInt) for each in server.sent)
+        sent = sum(
+            isinstance(each, messages.MissionItemInt | messages.MissionRequestInt)
+            for each in client.sent
+        )
+        asked = sum(isinstance(each, messages.MissionRequestInt) for each in server.sent)
         assert sent <= most * max(asked, 100)
     assert seconds > 0
 
@@ -189,13 +184,13 @@ def test_another_ground_station_uploads_something_else_at_the_same_time(kind: Mo
 def test_a_late_copy_of_an_announcement_ends_no_download() -> None:
     """ArduPilot waits 8 s for items then, refuses downloads meanwhile, and says it has given up."""
     rows = wire_items(a_mission(6, fence=FENCE), FENCES, vehicle_of("ardupilot"))
-    copy = Envelope(GROUND_STATION, MissionCount(VEHICLE, FENCES, len(rows)))
+    copy = Envelope(GROUND_STATION, messages.MissionCount(VEHICLE, FENCES, len(rows)))
     mock = mock_of("ardupilot")
     mock.lists.replace(FENCES, rows)
     script: Any = Script(read_list(peer_of("ardupilot"), FENCES))
-    client, vehicle = Station(script, GROUND_STATION), Station(mock, VEHICLE)
+    stations = Station(script, GROUND_STATION), Station(mock, VEHICLE)
     events = [(0.15, lambda now: mock.on(copy, now))]
-    took = simulate(client, vehicle, Faults(latency=0.05), events=events)
+    took = simulate(*stations, Faults(latency=0.05), events=events)
     assert (script.outcome.verdict, script.outcome.found) == ("accepted", rows)
     assert took < 20
 
@@ -232,7 +227,7 @@ def test_an_armed_vehicle_gets_no_fence_after_its_mission_and_that_ends_the_uplo
     script: Any = Script(upload_parts(parts, peer_of("px4")))
 
     def arm(envelope: Envelope, _: float) -> None:
-        if isinstance(envelope.message, MissionCount):  # while it is read back
+        if isinstance(envelope.message, messages.MissionCount):  # while it is read back
             mock.flight.arm(0.0)
 
     faults = Faults(latency=0.02)
@@ -260,65 +255,39 @@ BY_HAND = exchanges((EXCHANGES / "client.txt").read_text())
 SENT = [ROWS[name] for name in ("way", "other", *["way"] * 7)]
 
 
-def at_desk(job: str, firmware: str, count: str = "0") -> Desk:
+def client(job: str, firmware: str, count: str = "0") -> Desk:
     """Return a desk with the client, which is to read a list or to upload so many items."""
     peer = peer_of(firmware)
     return Desk(Script(read_list(peer) if job == "read" else send_list(SENT[: int(count)], peer)))
 
 
-def on_desk(desk: Desk) -> Callable[[str, int], list[Message]]:
-    """Return what tells the client on a `desk` the lines of an exchange."""
-
-    def tell(line: str, _: int) -> list[Message]:
-        text, _, who = line[2:].partition(" | ")
-        which, *numbers = who.split() or ("",)
-        other = Address(*map(int, numbers)) if which else VEHICLE
-        match line[0]:
-            case "b":
-                return desk.start()
-            case "c":
-                return list(desk.machine.cancel(desk.now))
-            case "~":
-                return desk.wait(float(text))
-            case "=":
-                end, result = desk.machine.outcome, desk.machine.outcome.result
-                told = "no result" if result is None else MavResult(result).name
-                assert text == "; ".join([f"{end.verdict} at {end.item}, {told}", *end.said])
-                return []
-        sender = other if which == "from" else VEHICLE
-        return desk.tell(parsed(text, other if which == "to" else GROUND_STATION), sender)
-
-    return tell
-
-
 @pytest.mark.parametrize("name", BY_HAND)
 def test_what_the_client_answers(name: str) -> None:
-    desk = at_desk(*name.partition(":")[0].split())
-    assert played(BY_HAND[name], on_desk(desk), ">") == BY_HAND[name]
+    tell = at_desk(client(*name.partition(":")[0].split()), GROUND_STATION)
+    assert played(BY_HAND[name], tell, ">") == BY_HAND[name]
 
 
 @BOTH
 def test_a_vehicle_that_asks_for_one_item_for_ever_is_given_up(kind: str) -> None:
-    desk = at_desk("upload", kind, "3")
-    tell = on_desk(desk)
+    desk = client("upload", kind, "3")
+    tell = at_desk(desk, GROUND_STATION)
     tell("begin", 1)
     for wait in (*["~ 0"] * 200, *["~ 0.25"] * 800):
         tell("< request mission 0", 1)
         if desk.machine.outcome is None:
             tell(wait, 0)
-    assert desk.sent[-1] == MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
+    assert desk.sent[-1] == messages.MissionAck(VEHICLE, 0, MavResult.OPERATION_CANCELLED)
     tell("= silent at 0, no result", 0)
 
 
 def test_a_download_that_is_always_ended_is_begun_anew_a_few_times() -> None:
     """As when a late request has ended it: PX4 says ERROR, and nothing more."""
-    desk = at_desk("read", "px4")
-    tell = on_desk(desk)
+    desk = client("read", "px4")
+    tell = at_desk(desk, GROUND_STATION)
     for line in ("begin", "< count mission 3", "< item mission 0 way", "< ack mission ERROR"):
         tell(line, 1)
-    assert MissionRequestList(VEHICLE, 0) in tell("~ 2.5", 1)
+    assert messages.MissionRequestList(VEHICLE, 0) in tell("~ 2.5", 1)
     assert tell("< item mission 1 way", 0) == []  # late: of the transfer before
-    for _ in range(100):
-        tell("~ 1", 0)
-        tell("< ack mission ERROR", 0)
+    for line in ("~ 1", "< ack mission ERROR") * 100:
+        tell(line, 0)
     tell("= refused at None, ERROR", 0)

@@ -44,7 +44,7 @@ def groups_of(mock: MockAutopilot) -> tuple[Names, ...]:
 
 @KINDS
 def test_all_are_read_whatever_is_lost(kind: str) -> None:
-    lossy = [Faults(loss=0.2, latency=0.1, seed=seed) for seed in range(30)]
+    lossy = [Faults(loss=0.2, latency=0.1, seed=seed) for seed in range(12)]
     for faults, most in ((Faults(), 2.0), *((each, 8.0) for each in lossy)):
         mock = mock_of(kind)
         groups, told = groups_of(mock), mock.parameters.values
@@ -100,16 +100,7 @@ def test_those_of_a_mission_are_set_and_read_back() -> None:
             assert changed == {change.name for change in changes}
 
 
-def test_nothing_is_set_where_one_is_not_known_and_what_is_not_kept_is_told() -> None:
-    mock = mock_of("px4")
-    del mock.parameters.values["MPC_JERK_AUTO"]
-    before = dict(mock.parameters.values)
-    job = set_parameters({"MPC_XY_CRUISE": 6.0, "MPC_JERK_AUTO": 9.0}, peer_of("px4"))
-    (changes, problem), _ = ran(job, mock)
-    assert changes == ()
-    assert "the vehicle has no MPC_JERK_AUTO: nothing was set" in problem
-    assert mock.parameters.values == before
-
+def test_a_value_that_the_vehicle_does_not_keep_is_told() -> None:
     class Stubborn(MockAutopilot):
         def _receive(self, envelope: Envelope, now: float) -> Any:
             keeps = isinstance(envelope.message, ParamSet)

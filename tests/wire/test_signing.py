@@ -90,7 +90,17 @@ def test_a_first_packet_is_at_most_a_minute_late_and_after_what_is_remembered() 
 def test_what_is_no_key_file_or_is_not_its_owners_alone_is_refused(key_file: Path) -> None:
     assert read_signing(key_file).key == KEY
     key_file.write_text(KEY.hex() + "\n")
-    assert read_signing(key_file).key == KEY
+    before = read_signing(key_file)
+    assert before.key == KEY
+    # The last time is kept beside the key.
+    before.latest = 77
+    remember(key_file, before)
+    assert read_signing(key_file).latest == 77
+    beside = key_file.with_name("key.last")
+    for nonsense in ("soon", "-1", f"{2**48}", "", "²"):
+        beside.write_text(nonsense)
+        with pytest.raises(InputError, match=r"key\.last: expected the time of the last packet"):
+            read_signing(key_file)
     key_file.write_text("open sesame")
     with pytest.raises(InputError, match="expected a signing key: 32 bytes, or 64 hex") as caught:
         read_signing(key_file)
@@ -105,29 +115,14 @@ def test_what_is_no_key_file_or_is_not_its_owners_alone_is_refused(key_file: Pat
             read_signing(key_file)
 
 
-def test_the_last_time_is_kept_beside_the_key(key_file: Path) -> None:
-    before = read_signing(key_file)
-    before.latest = 77
-    remember(key_file, before)
-    assert read_signing(key_file).latest == 77
-    beside = key_file.with_name("key.last")
-    for nonsense in ("soon", "-1", f"{2**48}", "", "²"):
-        beside.write_text(nonsense)
-        with pytest.raises(InputError, match=r"key\.last: expected the time of the last packet"):
-            read_signing(key_file)
-
-
-def test_a_signed_session(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signed_session_and_what_is_none(key_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No key, another one, or a recording is told as such."""
     with vehicle("px4", key=KEY) as (connection, _):
         for _ in range(2):  # the second is after what is remembered of the first
             assert upload(a_mission(5), connection, system=1, signing_key=key_file).verified
         hurry(monkeypatch)
-        report = upload(a_mission(5), connection, system=1)
-        assert not report.verified
-        assert "signs its packets" in report.problems[-1]
-
-
-def test_another_key_none_or_a_recording_is_told_as_such(key_file: Path) -> None:
+        problem = upload(a_mission(5), connection, system=1).problems[-1]
+        assert "signs its packets" in problem
     for theirs, latest, told in (
         (signing_key("other"), 0, r"signed with another key than the one in .*key$"),
         (None, 0, "packets come that are not signed: .* or leave out --signing-key"),
