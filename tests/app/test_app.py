@@ -215,8 +215,8 @@ def test_a_dragged_user_changes_flight_and_rate_as_the_command_line_says(
     assert math.dist(moved.radio.ground_user.position, (60, 60)) > 100
     out, result = tmp_path / "mission.waypoints", tmp_path / "result.npz"
     table = tmp_path / "precoders.csv"
-    command = [served.plan, "--out", out, "--precoders", table, "--save", result, "--json"]
-    told = json.loads(subprocess.check_output([COMMAND, *command]))
+    files = ("--out", out, "--precoders", table, "--save", result)
+    told = json.loads(subprocess.check_output([COMMAND, served.plan, *files, "--json"]))
     assert abs(rate - first) > 0.01
     assert rate == pytest.approx(told["delivered_rate"], abs=1e-6)
     frame = LocalFrame(moved.origin.latitude, moved.origin.longitude)

@@ -22,6 +22,7 @@ no setpoint; `cancelled`: the last word ends a transfer. Nothing is sent in any 
 """
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -56,11 +57,11 @@ def test_what_becomes_of_it(
     ending, *wanted = becomes.split(" & ")
     seen: dict[str, tuple[int, int, bool]] = {}
 
-    def look(word: str) -> None:
+    def look(word: str, _: float) -> None:
         seen[word] = len(scene.orders), mock.mode, mock.armed
 
     words = {word for each in wanted for word in each.split() if word.replace(".", "").isdigit()}
-    assert scene.run([(float(word), lambda _, word=word: look(word)) for word in words]) == ending
+    assert scene.run([(float(word), partial(look, word)) for word in sorted(words)]) == ending
     assert scene.client.wrong == []
     outcome, findings = watch.outcome, watch.gate.findings or ()
     texts: dict[str, Any] = {

@@ -63,7 +63,11 @@ def targets(directory: Path) -> dict[str, Target]:
     for key, name in (("gain", "link.yaml"), ("rates", "rates.csv")):
         plan = directory / f"{key}.yaml"
         plan.write_text(f"{SMALL}  bandwidth_mhz: 20\n  {key}: {name}\n")
-        add(key, name, lambda _, plan=plan: read_plan(plan), _SEEDS[name])
+
+        def beside(_: Path, plan: Path = plan) -> object:
+            return read_plan(plan)
+
+        add(key, name, beside, _SEEDS[name])
     side = np.arange(3.0)
     known = GainMap(
         side, side, side[1:], np.full((2, 3, 3), -90.0), False, np.ones((3, 3)), (47, 8)

@@ -36,8 +36,9 @@ def desk_for(
     behaviour = behaviour_of(kind, refusals=dict(refusals))
     desk = Desk(MockAutopilot(behaviour, home=HOME, **options), GROUND_STATION)
     desk.start()
-    for part in MissionType if mission is not None else ():
-        desk.machine.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
+    if mission is not None:
+        for part in MissionType:
+            desk.machine.lists.replace(part, wire_items(mission, part, vehicle_of(kind)))
     return desk
 
 

@@ -119,8 +119,9 @@ def at_desk(desk: Desk, to: Address) -> Callable[[str, int], list[Message]]:
 
     def tell(line: str, _: int) -> list[Message]:
         text, _, who = line[2:].partition(" | ")
-        which, *numbers = who.split() or ("",)
-        whom = {which: Address(*map(int, numbers))} if which else {}
+        other = Address(*map(int, who.split()[1:])) if who else None
+        sender, target = (other if who.startswith(each) else None for each in ("from", "to"))
+        said: Sequence[Message] = ()
         match line[0]:
             case "b":
                 said = desk.start()
@@ -129,11 +130,11 @@ def at_desk(desk: Desk, to: Address) -> Callable[[str, int], list[Message]]:
             case "~":
                 said = desk.wait(float(text))
             case "=":
-                end, said = desk.machine.outcome, ()
+                end = desk.machine.outcome
                 result = "no result" if end.result is None else MavResult(end.result).name
                 assert text == "; ".join([f"{end.verdict} at {end.item}, {result}", *end.said])
             case _:
-                said = desk.tell(parsed(text, whom.get("to", to)), whom.get("from"))
+                said = desk.tell(parsed(text, target or to), sender)
         kinds = messages.ListMessage | messages.Statustext
         return [each for each in said if isinstance(each, kinds)]
 

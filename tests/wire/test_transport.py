@@ -54,8 +54,9 @@ class Port:
         return found
 
     def close(self) -> None:
-        for each in (*self._peers, self.transport):
-            each.close()
+        for peer in self._peers:
+            peer.close()
+        self.transport.close()
 
 
 @pytest.fixture
