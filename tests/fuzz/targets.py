@@ -64,10 +64,10 @@ def targets(directory: Path) -> dict[str, Target]:
         plan = directory / f"{key}.yaml"
         plan.write_text(f"{SMALL}  bandwidth_mhz: 20\n  {key}: {name}\n")
 
-        def beside(_: Path, plan: Path = plan) -> object:
+        def read(_: Path, plan: Path = plan) -> object:
             return read_plan(plan)
 
-        add(key, name, beside, _SEEDS[name])
+        add(key, name, read, _SEEDS[name])
     side = np.arange(3.0)
     known = GainMap(
         side, side, side[1:], np.full((2, 3, 3), -90.0), False, np.ones((3, 3)), (47, 8)

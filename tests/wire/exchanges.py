@@ -118,7 +118,7 @@ def at_desk(desk: Desk, to: Address) -> Callable[[str, int], list[Message]]:
     """Return what tells the machine on a `desk`, at the address `to`, the lines of an exchange."""
 
     def tell(line: str, _: int) -> list[Message]:
-        text, _, who = line[2:].partition(" | ")
+        text, _bar, who = line[2:].partition(" | ")
         other = Address(*map(int, who.split()[1:])) if who else None
         sender, target = (other if who.startswith(each) else None for each in ("from", "to"))
         said: Sequence[Message] = ()
