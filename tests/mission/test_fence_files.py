@@ -12,6 +12,7 @@ from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import areas_of, free_area
 from faao_mav.mission.formats.fence_file import geojson_fence, kml_fence, read_fence
 
+DATA = Path(__file__).parent.parent / "data"
 SQUARE = [[8.0, 47.0], [8.1, 47.0], [8.1, 47.1], [8.0, 47.0]]
 HOLE = [[8.05, 47.01], [8.06, 47.01], [8.06, 47.02], [8.05, 47.01]]
 KML = """<?xml version="1.0" encoding="UTF-8"?>
@@ -43,39 +44,10 @@ def collection(*features: dict[str, Any], **more: Any) -> dict[str, Any]:
     return {"type": "FeatureCollection", "features": list(features)} | more
 
 
-OUT: list[dict[str, Any]] = [
-    {"Name": "No-fly zone 1"},
-    {"NAME": "R-12", "TYPE": "PROHIBITED"},
-    {"name": "Poly 2", "Type": "Exclusive", "Action": "Avoid"},
-    {"name": "P12", "Inclusion": False},
-    {"name": "field", "EXCLUSION": "true"},
-    {"title": "NoFlyZone"},
-    {"name": "keep_out 3"},
-    {"name": "NFZ"},
-    {"name": "restricted field"},
-    {"name": "exclusion fence"},
-    {"name": "hospital", "no_fly": True},
-    {"name": "park", "note": "flights not allowed"},
-]
-IN = [
-    {"name": "field"},
-    {"Name": "Poly 1", "Type": "Inclusive"},
-    {"name": "Unrestricted area"},
-    {"name": "exclusive use airspace"},
-    {"name": "P12", "INCLUSION": True},
-    {"name": "Operations Area"},
-    {"name": "no-fly zone of others", "inclusion": "True"},
-]
-NEITHER = [
-    {},
-    None,
-    {"name": "School"},
-    {"name": "Sperrgebiet"},
-    {"name": "not restricted"},
-    {"name": "un-restricted"},
-    {"name": "airfield"},
-    {"name": "R-12", "restricted": False},
-    {"name": "inclusion 3", "type": "no-fly"},
+WORDS = [
+    line.split(" | ")
+    for line in (DATA / "fences" / "words.txt").read_text().splitlines()
+    if not line.startswith("#")
 ]
 
 
@@ -84,25 +56,23 @@ def inclusion(properties: object, **layer: str) -> bool:
     return polygon.inclusion
 
 
-def test_words_tell_zones_to_stay_in_and_out_of() -> None:
-    assert [inclusion(properties) for properties in OUT] == [False] * len(OUT)
-    assert [inclusion(properties) for properties in IN] == [True] * len(IN)
-    for properties in NEITHER:
-        with pytest.raises(MissionFileError, match=r"geometry: .*property inclusion: true"):
-            inclusion(properties)
+def test_words_tell_zones_to_stay_in_and_out_of_no_case_or_layer_lets_into_one() -> None:
+    for kind, text in WORDS:
+        said = json.loads(text)
+        if kind == "asked":
+            with pytest.raises(MissionFileError, match=r"geometry: .*property inclusion: true"):
+                inclusion(said)
+            continue
+        assert inclusion(said) is (kind == "in"), text
+        upper = {
+            key.upper(): value.upper() if isinstance(value, str) and " " in value else value
+            for key, value in said.items()
+        }
+        for told in (said, upper, {key.lower(): said[key] for key in said}) if kind == "out" else ():
+            assert inclusion(told) is inclusion(told, name="my field") is False
     assert inclusion({"name": "school"}, name="no-fly zones") is False
     with pytest.raises(MissionFileError, match=r"tells both to stay in .keep in. and to stay out"):
         inclusion({"name": "keep-in field"}, name="no-fly zones")
-
-
-def test_no_case_or_layer_makes_a_no_fly_zone_one_to_stay_in() -> None:
-    for properties in OUT:
-        upper = {
-            key.upper(): value.upper() if isinstance(value, str) and " " in value else value
-            for key, value in properties.items()
-        }
-        for told in (properties, upper, {key.lower(): properties[key] for key in properties}):
-            assert inclusion(told) is inclusion(told, name="my field") is False
 
 
 def test_polygons_of_kml_with_holes_and_exclusions() -> None:
@@ -185,7 +155,7 @@ def test_files_by_their_ending(tmp_path: Path) -> None:
     (tmp_path / "b.GeoJSON").write_text(json.dumps(feature("Polygon", [SQUARE], {"name": "field"})))
     assert len(read_fence(tmp_path / "a.kml").polygons) == 4
     assert len(read_fence(tmp_path / "b.GeoJSON").polygons) == 1
-    assert len(read_fence(Path("tests/data/missions/fence_and_rally.plan")).circles) == 1
+    assert len(read_fence(DATA / "missions" / "fence_and_rally.plan").circles) == 1
     for name, told in (("d.shp", r"\.shp"), ("e.kml", "read")):
         with pytest.raises(MissionFileError, match=f"{name}: .*{told}"):
             read_fence(tmp_path / name)

@@ -1,5 +1,6 @@
 """What is impossible, or no autopilot keeps, is refused by every format alike, in one line."""
 
+import cmath
 import json
 import math
 from pathlib import Path
@@ -17,22 +18,12 @@ from faao_mav.mission.item import MAX_ITEMS
 from faao_mav.plan import parse_plan, read_plan, yaml_text
 
 
-def ring(corners: int, number: int = 0) -> tuple[LatLon, ...]:
-    """Return the corners of a thin strip that crosses nothing."""
-    half, west = corners // 2, 149.17 + number * 1e-5
-    there = [(-35.36 + k * 1e-6, west) for k in range(half)]
-    back = [(-35.36 + k * 1e-6, west + 5e-6) for k in reversed(range(corners - half))]
-    return (*there, *back)
-
-
-def comb(teeth: int, *, across: bool) -> tuple[LatLon, ...]:
-    """Return the corners of a comb of 200 m; its teeth cross each of one `across` four times."""
-    corners = [(-35.361, 149.17)]
-    for k in range(teeth):
-        near, far = -35.361 + 0.002 * k / teeth, -35.361 + 0.002 * (k + 0.5) / teeth
-        corners += [(near, 149.171), (near, 149.173), (far, 149.173), (far, 149.171)]
-    corners.append((-35.359, 149.17))
-    return tuple((b - 184.532, a + 184.532) for a, b in corners) if across else tuple(corners)
+def ring(corners: int, turned: float = 0.0) -> tuple[LatLon, ...]:
+    """Return the corners of a star, turned by so many: its outline does not cross itself."""
+    turns = [2 * math.pi * (k + turned) / corners for k in range(corners)]
+    sizes = [1e-3 * (1 + k % 2) for k in range(corners)]
+    ways = zip(sizes, turns, strict=True)
+    return tuple((-35.36 + r * math.cos(t), 149.17 + r * math.sin(t)) for r, t in ways)
 
 
 def as_geojson(path: Path, *zones: tuple[LatLon, ...], kind: str = "no-fly") -> None:
@@ -67,39 +58,14 @@ def test_all_outlines_count_by_kind_and_where_they_cross(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert (fence.MAX_CORNERS, fence.MAX_CROSSINGS) == (8_192, 50_000)
-    monkeypatch.setattr(fence, "MAX_CORNERS", 1_000)
-    monkeypatch.setattr(fence, "MAX_CROSSINGS", 500)
-    few = Polygon(ring(400, 1), False)
-    assert Fence((few, Polygon(ring(600), False)))
-    with pytest.raises(InputError, match="1,001 corners and circles; at most 1,000 are accepted"):
-        Fence((few, Polygon(ring(601), False)))
-    for inclusion in (True, False):
-        circles = (Circle((1.0, 2.0), 3.0, inclusion),) * 255
-        assert Fence((), circles)
-        with pytest.raises(InputError, match=r"256 (in|ex)clusion circles"):
-            Fence((), (*circles, circles[0]))
-    turns = [complex(math.cos(2.4 * k), math.sin(2.4 * k)) / 1e3 for k in range(14)]
-    star = Polygon(tuple((each.real, each.imag) for each in turns), False)
-    teeth = Polygon(comb(100, across=False), False)
-    rings = tuple(Circle((-35.36, 149.172), 50.0 + k / 10, False) for k in range(10))
-    assert Fence((star,) * 3)
-    assert Fence((teeth,), rings[:2])
-    for polygons, around in (((star,) * 4, ()), ((teeth,), rings)):
-        with pytest.raises(InputError, match="cross at more than 500 places"):
-            Fence(polygons, around)
-    crossing = tuple(comb(25, across=across) for across in (True, False))
-    as_geojson(tmp_path / "x.geojson", *crossing, kind="field")
-    with pytest.raises(InputError, match=r"x\.geojson: geometry: fence: its outlines cross at"):
-        read_fence(tmp_path / "x.geojson")
-
-
-def test_the_fence_of_a_plan_and_that_of_its_file_have_the_limit_together(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr(fence, "MAX_CORNERS", 100)
+    few = Polygon(ring(40), False)
+    assert Fence((few, Polygon(ring(60), False)))
+    with pytest.raises(InputError, match="101 corners and circles; at most 100 are accepted"):
+        Fence((few, Polygon(ring(61), False)))
     path, drawn = tmp_path / "x.yaml", tmp_path / "x.geojson"
-    as_geojson(drawn, ring(60))
-    places = [{"latitude": north, "longitude": east} for north, east in ring(40, 1)]
+    as_geojson(drawn, ring(60))  # a plan's own fence and that of its file have it together
+    places = [{"latitude": north, "longitude": east} for north, east in ring(40)]
     zones = json.dumps([{"polygon": places}])
     path.write_text(f"{SMALL}fence: {{file: x.geojson, exclusion: {zones}}}\n")
     text = read_plan(path).text  # the copy beside a result, with all corners in it
@@ -107,6 +73,31 @@ def test_the_fence_of_a_plan_and_that_of_its_file_have_the_limit_together(
     as_geojson(drawn, ring(61))
     with pytest.raises(InputError, match=r"x\.yaml: fence: 101 corners and circles"):
         read_plan(path)
+
+    monkeypatch.setattr(fence, "MAX_CORNERS", 256)
+    for inclusion in (True, False):
+        circles = (Circle((1.0, 2.0), 3.0, inclusion),) * 255
+        assert Fence((), circles)
+        with pytest.raises(InputError, match=r"256 (in|ex)clusion circles"):
+            Fence((), (*circles, circles[0]))
+    knot = [1e-3 * cmath.exp(2.4j * k) for k in range(14)]
+    knots = (Polygon(tuple((each.real, each.imag) for each in knot), False),) * 2
+    stars = tuple(Polygon(ring(60, turned), False) for turned in (0.0, 0.5))
+    row = tuple(Circle((-35.36, 149.17 + k * 1e-4), 150.0, False) for k in range(8))
+    for polygons, around, crossings in (
+        (knots, (), 208),
+        (stars, (), 60),
+        (stars[:1], row[:1], 60),
+        ((), row, 56),
+    ):
+        monkeypatch.setattr(fence, "MAX_CROSSINGS", crossings)
+        assert Fence(polygons, around)
+        monkeypatch.setattr(fence, "MAX_CROSSINGS", crossings - 1)
+        with pytest.raises(InputError, match=f"cross at more than {crossings - 1} places"):
+            Fence(polygons, around)
+    as_geojson(drawn, *(each.vertices for each in stars), kind="field")
+    with pytest.raises(InputError, match=r"x\.geojson: geometry: fence: its outlines cross at"):
+        read_fence(drawn)
 
 
 def test_endless_lists_are_not_read_to_their_end(monkeypatch: pytest.MonkeyPatch) -> None:
