@@ -167,40 +167,6 @@ def test_terrain_tells_free_space_and_what_it_takes(tmp_path: Path) -> None:
 
 
 ORIGIN = ("latitude", "longitude", "elevation")
-FLAT = f"--terrain N47E008.hgt --station {PLACE}"
-AT_900 = f"{FLAT} --frequency 900"
-REFUSED = f"""
---station {PLACE} | expected LOG..., flights that were measured, or --terrain DEM
-x.csv {FLAT} | expected LOG..., flights that were measured, or --terrain DEM
-{FLAT} | --frequency: expected MHz, 30 to 100000, for --terrain
-{FLAT} --frequency 2.4 | --frequency: expected MHz, 30 to 100000
-{AT_900} --heights 60,40 | --heights 60,40: expected metres
-{AT_900} --heights 60,x | --heights 60,x: expected metres
-{AT_900} | N47E008.hgt: cannot be read
-{FLAT} --report a.html | --report: is about logs
-{AT_900} --unit rssi | --unit: is about logs
-{AT_900} --calibrate 3=x | --calibrate: is about logs
-{FLAT} --map m.npz | --map: give --out, the file that names it
-{FLAT} --map m.csv --out a.yaml | --map m.csv: give a name
-flight.csv --station 1,2 | --station 1,2: expected LAT,LON,HEIGHT
-flight.csv --station 100,2,3 | expected LAT,LON,HEIGHT
-flight.csv --station 1,nan,3 | expected LAT,LON,HEIGHT
-flight.csv --station {PLACE} --unit rssi= | --unit rssi=: expected COLUMN=UNIT
-flight.csv --station {PLACE} --calibrate 3=x | --calibrate 3=x: expected COUNT=DBM
-flight.csv --station {PLACE} --calibrate 3=4 --calibrate 3=5 | two different counts
-flight.csv --station {PLACE} --out x.txt | x.txt
-flight.csv --station {PLACE} --unit rsi=dbm | --unit rsi: no such column; give one of time
-flight.csv --station {PLACE} --unit rssi=watt | 'watt'; name it in the header
-"""
-
-
-def test_unusable_arguments_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    table(tmp_path, record(60.0))
-    for line in REFUSED.strip().splitlines():
-        command, message = line.split(" | ")
-        assert message in " ".join(link(*command.split(), status=2).split())
-    assert [path.name for path in tmp_path.iterdir()] == ["flight.csv"]
 
 
 def test_logs_without_a_radio_or_its_unit_are_told(tmp_path: Path) -> None:
