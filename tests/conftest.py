@@ -63,6 +63,18 @@ radio:
 FLYABLE = SMALL.replace("max_speed: 20", "max_speed: 10") + "  fading: none\n"
 """The small plan within what ArduCopter flies, in the line of sight: made in half a second."""
 
+SHORT = {
+    "vehicle.max_speed": 8.0,
+    "vehicle.max_acceleration": 1.5,
+    "flight.start": [0, 30],
+    "flight.end": [30, 0],
+    "flight.altitude": 40,
+    "flight.duration": 14,
+    "flight.time_step": 0.5,
+    "radio.ground_user.position": [40, 40],
+}
+"""Of the sample plans: seconds of flight, at a copter's speeds."""
+
 MakePlan = Callable[..., Plan]
 
 

@@ -4,7 +4,6 @@ import ast
 import re
 import subprocess
 import sys
-from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -35,16 +34,13 @@ FLOORS = (
 FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 
 
-def modules() -> dict[str, Path]:
-    """Return every module of the package by its dotted name."""
-    found = {}
-    for path in PACKAGE.rglob("*.py"):
-        parts = ("faao_mav", *path.relative_to(PACKAGE).with_suffix("").parts)
-        found[".".join(parts).removesuffix(".__init__")] = path
-    return found
-
-
-MODULES = modules()
+MODULES = {
+    ".".join(("faao_mav", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(
+        ".__init__"
+    ): path
+    for path in PACKAGE.rglob("*.py")
+}
+"""Every module of the package by its dotted name."""
 
 
 def imports(path: Path) -> set[str]:
@@ -60,41 +56,31 @@ def imports(path: Path) -> set[str]:
     return {name for name in found if name.startswith("faao_mav.")}
 
 
-@cache
-def all_imports() -> dict[str, set[str]]:
-    """Return what each module of the package imports."""
-    return {name: imports(path) for name, path in MODULES.items()}
+IMPORTS = {name: imports(path) for name, path in MODULES.items()}
+BETWEEN = [
+    (name, other, name.split(".")[1], other.split(".")[1])
+    for name, others in IMPORTS.items()
+    if name not in ("faao_mav", "faao_mav.__main__")
+    for other in others
+]
+"""Each module that imports another, with the rooms of both."""
 
 
 def test_no_import_runs_upward() -> None:
-    upward = [
-        (name, other)
-        for name, others in all_imports().items()
-        for other in others
-        if name not in ("faao_mav", "faao_mav.__main__")
-        and other.split(".")[1] != name.split(".")[1]
-        and FLOOR[other.split(".")[1]] >= FLOOR[name.split(".")[1]]
-    ]
+    upward = [each for each in BETWEEN if FLOOR[each[3]] >= FLOOR[each[2]] and each[3] != each[2]]
     assert upward == []
 
 
 def test_what_knows_missions_and_autopilots_knows_no_radios_or_plans() -> None:
     half = {"mission", "autopilot", "wire", "sim"}
     ground = {"errors", "arrays", "vector", "files", "geodesy", "power", "processes"}
-    beyond = [
-        (name, other)
-        for name, others in all_imports().items()
-        for other in others
-        if name.split(".")[1:2] and name.split(".")[1] in half
-        if other.split(".")[1] not in half | ground
-    ]
-    assert beyond == []
+    assert [each for each in BETWEEN if each[2] in half and each[3] not in half | ground] == []
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
     """Not even for types, where Python itself would not mind."""
     try:
-        TopologicalSorter(all_imports()).prepare()
+        TopologicalSorter(IMPORTS).prepare()
     except CycleError as error:
         pytest.fail(" -> ".join(error.args[1]))
 

@@ -28,10 +28,7 @@ from faao_mav.mission.formats import read_mission, read_mission_file, write_miss
 from faao_mav.mission.formats.parameter_file import read_parameters
 from faao_mav.mission.item import Mission, MissionItem
 from faao_mav.plan.keys import reference
-from faao_mav.sim import MockAutopilot
-from faao_mav.wire.messages import ParamRequestRead, ParamValue
-from faao_mav.wire.protocol import Address, MavResult
-from faao_mav.wire.transport import Transport
+from faao_mav.wire.protocol import MavResult
 
 pytestmark = pytest.mark.usefixtures("planned_once")
 
@@ -135,18 +132,6 @@ def test_one_pass_through_every_command(plan: Path, out: Path, tmp_path: Path) -
     assert row["delivered"] == pytest.approx(told["delivered_rate"])
 
 
-def test_the_lines_of_the_main_job_begin_with_what_matters(plan: Path, out: Path) -> None:
-    result = run(plan, "--out", out)
-    assert (result.exit_code, result.stderr) == (0, "")
-    assert re.match(r"gentle: delivers 1\.\d+ bit/s/Hz for 16 s; the mission keeps ", result.stdout)
-    assert "converged after" not in result.stdout
-    assert str(out) in result.stdout
-    for order in (["--quiet", plan], ["plan", plan, "--quiet"]):
-        out.unlink()
-        assert run(*order, "--out", out).output == ""
-        assert out.exists()
-
-
 @pytest.mark.usefixtures("coarse_map")
 def test_bound_and_algorithm_1_by_option(plan: Path) -> None:
     plan.write_text(edited(FLYABLE, {"radio.fading": "ergodic", "radio.fading_samples": 4}))
@@ -164,8 +149,8 @@ def test_bound_and_algorithm_1_by_option(plan: Path) -> None:
 
 def test_what_is_made_of_a_plan_for_px4_and_a_plane(plan: Path, tmp_path: Path) -> None:
     plan.write_text(edited(GENTLE, {"vehicle.autopilot": "px4"}))
-    for name in ("m.waypoints", "m.plan", "m.kml"):
-        assert run(plan, "--out", tmp_path / name, "--quiet").output == ""
+    for order in (["m.waypoints", plan], ["m.plan", "plan", plan], ["m.kml", "--quiet", plan]):
+        assert run(*order[1:], "--out", tmp_path / order[0], "--quiet").output == ""
     read = read_mission_file(tmp_path / "m.plan")
     assert (read.firmware, read.vehicle_type) == (12, 2)
     assert read.mission == read_mission(tmp_path / "m.waypoints")
@@ -179,17 +164,29 @@ def test_what_is_made_of_a_plan_for_px4_and_a_plane(plan: Path, tmp_path: Path) 
     assert (told["verified"], told["vehicle"]["type"]) == (True, "plane")
 
 
-def test_a_download_brings_the_fence_in_a_file_of_its_own(tmp_path: Path) -> None:
-    fence = Fence(circles=(Circle((-35.36, 149.16), 90.0, inclusion=True),))
-    sent = Mission((MissionItem(16, 3, x=-35.36, y=149.16, z=50),), HOME, fence)
-    write_mission(sent, tmp_path / "sent.plan")
-    with vehicle("px4") as (to, _):
-        assert run("upload", tmp_path / "sent.plan", "--to", to).exit_code == 0
+def test_what_a_vehicle_holds_is_downloaded_and_no_other_mission_flown(
+    plan: Path, out: Path, tmp_path: Path
+) -> None:
+    up = MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=20.0)
+    over = MissionItem(16, 3, x=HOME.latitude, y=HOME.longitude, z=30.0)
+    fence = Fence(circles=(Circle((HOME.latitude, HOME.longitude), 90.0, inclusion=True),))
+    write_mission(Mission((up, over, MissionItem(20, 2)), HOME, fence), out)
+    with vehicle("px4") as (to, mock):
+        assert run("upload", out, "--to", to).exit_code == 0
         told = run("download", "--from", to, "--out", tmp_path / "back.waypoints")
         assert run("download", "--from", to, "--out", tmp_path / "b.plan").exit_code == 0
+        out.write_text(out.read_text().replace("30", "40"))
+        result = run("fly", out, "--to", to, "--arm", "--json")
+        assert (result.exit_code, mock.armed) == (1, False)
     assert "vehicle      PX4 copter (system 1, component 1, disarmed)" in told.stdout
     assert "5003" in (tmp_path / "back.fence.waypoints").read_text()
     assert read_mission_file(tmp_path / "b.plan").firmware == 12
+    end = json.loads(result.stdout.splitlines()[-1])
+    assert end["ending"] == "different"
+    assert end["differences"] == ["mission item 1: z: sent 40.0, found 30.0"]
+    result = run("debrief", DATA / "logs" / "arducopter.tlog", "--plan", plan)
+    assert result.exit_code == 1
+    assert "the plan's flight is not in it" in result.output
 
 
 def test_a_mission_with_errors_is_kept_but_not_called_good(plan: Path, out: Path) -> None:
@@ -264,25 +261,6 @@ def test_an_upload_that_fails_or_is_refused_leaves_the_files(plan: Path, out: Pa
         assert run(plan, "--upload", to, "--allow-armed", "--quiet").exit_code == 0
 
 
-def test_another_mission_is_not_flown_and_another_flight_not_debriefed(
-    plan: Path, out: Path
-) -> None:
-    up = MissionItem(22, 3, x=HOME.latitude, y=HOME.longitude, z=20.0)
-    over = MissionItem(16, 3, x=HOME.latitude, y=HOME.longitude, z=30.0)
-    write_mission(Mission((up, over, MissionItem(20, 2)), HOME), out)
-    with vehicle("px4") as (to, mock):
-        assert run("upload", out, "--to", to).exit_code == 0
-        out.write_text(out.read_text().replace("30", "40"))
-        result = run("fly", out, "--to", to, "--arm", "--json")
-        assert (result.exit_code, mock.armed) == (1, False)
-    told = json.loads(result.stdout.splitlines()[-1])
-    assert told["ending"] == "different"
-    assert told["differences"] == ["mission item 1: z: sent 40.0, found 30.0"]
-    result = run("debrief", DATA / "logs" / "arducopter.tlog", "--plan", plan)
-    assert result.exit_code == 1
-    assert "the plan's flight is not in it" in result.output
-
-
 def test_parameters_beside_a_mission_say_whose_it_is_and_are_used(plan: Path, out: Path) -> None:
     plan.write_text(edited(GENTLE, {"vehicle.autopilot": "px4"}))
     run(plan, "--out", out)
@@ -317,21 +295,14 @@ def test_parameters_beside_a_mission_say_whose_it_is_and_are_used(plan: Path, ou
 
 
 def test_the_mock_has_its_parameters(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    made: list[MockAutopilot] = []
-
-    def serve(mock: MockAutopilot, transport: Transport, **_: object) -> None:
-        transport.close()
-        made.append(mock)
-
-    monkeypatch.setattr("faao_mav.sim.faults.serve", serve)
+    made: list[Any] = []
+    monkeypatch.setattr("faao_mav.sim.faults.serve", lambda *parts, **_: made.extend(parts))
     (slow := tmp_path / "slow.param").write_text("WPNAV_ACCEL,50\n")
     listen = ("--listen", f"udpin:127.0.0.1:{free_port()}")
     assert run("autopilot", *listen, "--parameters", slow).exit_code == 0
-    (mock,) = made
+    mock, transport = made
+    transport.close()
     assert mock.flight.vehicle.parameters["WPNAV_ACCEL"] == 50
-    (answer,) = mock.parameters.on(ParamRequestRead(Address(1, 1), "WPNAV_ACCEL", -1))
-    assert isinstance(answer, ParamValue)
-    assert answer.param_value == 50
 
 
 def test_what_a_format_cannot_hold_and_what_is_odd_about_a_file_is_told(tmp_path: Path) -> None:
@@ -382,7 +353,6 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     assert all(f"\n  {command} " in shown for command in commands.split())
     assert run("-h").stdout == shown
     assert "--method" in run("plan.yaml", "--help").stdout
-    assert run("--version").stdout.startswith("faao-mission ")
     validates = run("validate", "--help").stdout
     assert all(name in validates for name in (*autopilots(), *kinds()))
     for command, *order in (  # what is asked for most stands first
@@ -392,19 +362,15 @@ def test_help_tells_how_to_plan_and_every_command() -> None:
     ):
         listed = run(command, "--help").stdout.partition("Options:")[2]
         assert order == sorted(order, key=listed.index)
-    bare = run()
-    assert (bare.exit_code, "Commands:" in bare.stderr) == (2, True)
+    assert "Commands:" in run().stderr
 
 
-def test_as_a_program(plan: Path, tmp_path: Path) -> None:
-    """The installed script: progress off a terminal stays silent, errors are one line."""
+def test_as_a_program(tmp_path: Path) -> None:
+    """The installed script: errors are one line."""
 
     def script(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
         return subprocess.run([SCRIPT, *map(str, arguments)], text=True, **options)
 
-    good = script(plan, "--json", capture_output=True)
-    assert (good.returncode, good.stderr) == (0, "")
-    json.loads(good.stdout)
     where = tmp_path / "no.yaml"
     bad = script(where, capture_output=True)
     assert bad.returncode == 2

@@ -90,20 +90,19 @@ def test_logs_of_every_kind_give_the_law_that_was_flown(tmp_path: Path) -> None:
     assert "<image" not in text
 
 
-def test_a_table_without_a_power_gives_the_shape_alone(tmp_path: Path) -> None:
+def test_without_a_power_the_shape_is_told_where_no_law_holds_nothing_is_written(
+    tmp_path: Path,
+) -> None:
     path, out = table(tmp_path, record(60.0)), tmp_path / "link.yaml"
     text = link(path, "--station", PLACE, "--out", out)
     assert "shape only: the plan's radio.reference_gain_db stands" in text
     assert "reference_gain_db" not in out.read_text()
-
-
-def test_where_no_law_holds_nothing_is_written(tmp_path: Path) -> None:
-    path, out = table(tmp_path, record(60.0, spread=25.0)), tmp_path / "link.yaml"
+    out.unlink()
+    table(tmp_path, record(60.0, spread=25.0))
     text = link(path, "--station", PLACE, "--out", out, status=1)
     assert "no law       of distance and elevation holds" in text
-    assert not out.exists()
     told = json.loads(link(path, "--station", PLACE, "--out", out, "--json", status=1))
-    assert (told["holds"], told["written"]) == (False, [])
+    assert (told["holds"], told["written"], out.exists()) == (False, [], False)
 
 
 def test_what_the_law_leaves_is_a_map_above_it(tmp_path: Path) -> None:

@@ -88,20 +88,13 @@ def test_what_a_page_shows_is_printed(page: str, folder: Path) -> None:
 
 AS_SHOWN = """
 rate 2.2572 bit | rate  2.2550 bit | rate 2.2540 bit
-rate 2.26 bit | rate 2.2572134 bit | rate 2.29 bit
-items 32 | items 32.0000 | items 33
-route of 853 m | route of 854 m | route of 856 m
 20 m/s | 20 m/s | 21 m/s
 predicted in 120.0 s (-0.0 s) | predicted in 120.2 s (+0.1 s) | predicted in 121.0 s (-0.0 s)
 2.694 +- 0.002, 2.685 delivered | 2.690 +- 0.001, 2.680 delivered | 2.684 +- 0.002, 2.685 delivered
-20  2.694 +- 0.002 | 20  2.694 +- 0.002 | 21  2.694 +- 0.002
-2.694 +- 0.002 | 2.690 +- 0.002 | 2.694 +- 0.004
 0.6772 +- 0.0079 | 0.6772 +- 0.0079 | 0.6800 +- 0.0079
 -35.360107347 149.1652 | -35.360101234 149.1652 | -35.360207347 149.1652
 after 8 iterations, took 0.5 s: | after 1 iteration, took 12.5 s: | after 8 iterations, took 0.5 m:
-stationary to 4.6e-05 | stationary to 9.1e-07 | stationary to 1 m
 a#...#c | a#b#b#c | a#b#b
-a#... | a#b | b#b
 a#b | a#b | a
 """
 """What is shown, what counts as that, and what does not; # ends a line."""
@@ -198,11 +191,6 @@ def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
     rows = re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
     shown = {int(floor): set(re.findall(r"`(\w+)`", rooms)) for floor, rooms in rows}
     assert shown == {floor: set(rooms) for floor, rooms in enumerate(FLOORS, start=1)}
-
-
-def test_the_reference_has_every_public_name() -> None:
-    shown = re.findall(r"^::: faao_mav\.(\w+)$", PAGES["docs/reference.md"], re.MULTILINE)
-    assert sorted(shown) == faao_mav.__all__
 
 
 def test_the_readme_is_short() -> None:

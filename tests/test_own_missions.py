@@ -3,24 +3,12 @@
 from typing import Any
 
 import pytest
-from conftest import MISSIONS, SMALL, edited
+from conftest import MISSIONS, SHORT, SMALL, edited
 
 from faao_mav.plan import parse_plan
 from faao_mav.schedule.conversion import Conversion
 from faao_mav.validate import Check
 from faao_mav.workflow import plan_mission
-
-SHORT: dict[str, Any] = {
-    "vehicle.max_speed": 8.0,
-    "vehicle.max_acceleration": 1.5,
-    "flight.start": [0, 30],
-    "flight.end": [30, 0],
-    "flight.altitude": 40,
-    "flight.duration": 14,
-    "flight.time_step": 0.5,
-    "radio.ground_user.position": [40, 40],
-}
-"""Of the sample plans: seconds of flight, at a copter's speeds."""
 
 
 def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
@@ -29,6 +17,7 @@ def checked(text: str, changes: dict[str, Any]) -> tuple[Conversion, Check]:
     conversion, found, promised = result.conversion, result.check, result.prediction
     assert conversion is not None
     assert found is not None
+    assert found.track is not None
     assert promised is not None
     assert found.link is not None
     assert found.link.predicted_rate == pytest.approx(promised.rates.R_avg, rel=0.005)
@@ -55,7 +44,6 @@ def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
     changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
     changes |= {"radio.fading_samples": 4, "optimizer.max_iterations": 2}
     _, found = checked(text, SHORT | changes)
-    assert found.track is not None
     told = complaints(found)
     if parameters == "keep":  # the defaults may be too slow for a plan, and that is said
         told = [each for each in told if not each.startswith("link-")]
@@ -71,7 +59,6 @@ def test_the_sample_plane() -> None:
         "radio.causal": False,  # the causal flight begins with a turn that is too tight, as told
     }
     conversion, found = checked(text, changes)
-    assert found.track is not None
     assert [each for each in complaints(found) if not each.startswith("link-")] == []
     assert found.link is not None
     assert found.link.share > 0.98

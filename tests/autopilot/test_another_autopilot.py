@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import MISSIONS, edited, free_port
+from conftest import MISSIONS, SHORT, edited, free_port
 from served import running
 from typer.testing import CliRunner
 
@@ -90,18 +90,7 @@ COPTER = VehicleType(
 
 PLAN = edited(
     (MISSIONS / "copter_relay.yaml").read_text(),
-    {
-        "vehicle.autopilot": "toy",
-        "vehicle.max_speed": 8.0,
-        "vehicle.max_acceleration": 1.5,
-        "flight.start": [0, 30],
-        "flight.end": [30, 0],
-        "flight.altitude": 40,
-        "flight.duration": 14,
-        "flight.time_step": 0.5,
-        "radio.ground_user.position": [40, 40],
-        "radio.fading_samples": 4,
-    },
+    SHORT | {"vehicle.autopilot": "toy", "radio.fading_samples": 4},
 )
 
 

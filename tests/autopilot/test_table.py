@@ -8,9 +8,6 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot import (
     ARDUCOPTER,
-    ARDUPLANE,
-    PX4_COPTER,
-    PX4_PLANE,
     Vehicle,
     VehicleType,
     families,
@@ -24,8 +21,7 @@ from faao_mav.errors import InputError
 from faao_mav.mission.item import Mission
 from faao_mav.validate.context import ValidationContext
 
-TYPES = (ARDUCOPTER, ARDUPLANE, PX4_COPTER, PX4_PLANE)
-PARAMETERS = [(each, parameter) for each in TYPES for parameter in each.parameters.values()]
+PARAMETERS = [(each, one) for each in vehicle_types() for one in each.parameters.values()]
 UNITS = {"", "m", "s", "rad", "m/s", "m/s^2", "m/s^3", "1/s", "1/s^2", "rad/s", "rad/s^2"}
 
 
@@ -33,15 +29,10 @@ def bare(each: VehicleType, parameters: dict[str, float] | None = None) -> Vehic
     return Vehicle(each.family.key, each.kind, parameters or {})
 
 
-def another(parameter: Parameter) -> float:
-    """A usable value of `parameter` that is not its default."""
-    value = parameter.default * 0.8 if parameter.default else 1.0
-    return value if value >= parameter.least else parameter.default * 1.25
-
-
-def test_every_record_is_whole_and_set_by_each_of_its_names() -> None:
+def test_every_record_is_whole_set_by_its_names_and_holds_what_is_recommended() -> None:
     for each, parameter in PARAMETERS:
-        said, value = f"{each.name} {parameter.key}", another(parameter)
+        said, value = f"{each.name} {parameter.key}", parameter.default * 0.8 or 1.0
+        value = value if value >= parameter.least else parameter.default * 1.25
         assert parameter.unit in UNITS, said
         assert parameter.least <= parameter.default <= parameter.greatest, said
         assert all(name.isupper() and len(name) <= 16 for name in parameter.names), said
@@ -55,10 +46,7 @@ def test_every_record_is_whole_and_set_by_each_of_its_names() -> None:
             if each.flight_model is not None:
                 model = vehicle.flight_model()
                 assert getattr(model, parameter.key, value) == pytest.approx(value), name
-
-
-def test_defaults_and_what_is_recommended_are_in_the_table() -> None:
-    for each in TYPES:
+    for each in vehicle_types():
         if each.flight_model is not None:
             assert bare(each).flight_model() == type(bare(each).flight_model())()
         known = {name: p for p in each.parameters.values() for name in p.names}
@@ -83,27 +71,11 @@ def test_a_value_is_usable_or_named_in_an_error(
         assert vehicle.usable().parameters == {}
 
 
-def test_the_newest_name_counts_and_a_cap_lowers_it() -> None:
+def test_the_newest_name_counts_a_cap_lowers_it_and_names_tell_whose_they_are() -> None:
     both = Vehicle(parameters={"WPNAV_ACCEL": 400, "WP_ACC": 3.0})
     assert (both.value("acceleration"), both.name_of("acceleration")) == (3.0, "WP_ACC")
     capped = Vehicle("px4", parameters={"MPC_Z_V_AUTO_UP": 4, "MPC_Z_VEL_MAX_UP": 2})
     assert (capped.value("climb_speed"), capped.name_of("climb_speed")) == (2, "MPC_Z_VEL_MAX_UP")
-
-
-def test_vehicles_are_found_by_name_and_number() -> None:
-    assert set(vehicle_types()) == set(TYPES)
-    for each in vehicle_types():
-        assert vehicle_type(each.family.key, each.kind) is each
-        for number in each.mav_types:
-            assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each
-    assert len({each.mav_autopilot for each in families().values()}) == len(families())
-    assert vehicle_type_by_numbers(3, None) is ARDUCOPTER
-    assert vehicle_type_by_numbers(3, 10) is None
-    with pytest.raises(InputError, match="betaflight copter is unknown; known are ardupilot"):
-        _ = Vehicle("betaflight").type
-
-
-def test_names_tell_whose_parameters_they_are() -> None:
     for names, whose in (
         (["WPNAV_SPEED"], "ardupilot"),
         (["WP_SPD", "RTL_ALT"], "ardupilot"),
@@ -114,3 +86,16 @@ def test_names_tell_whose_parameters_they_are() -> None:
         ([], None),
     ):
         assert autopilot_of(names) == whose
+
+
+def test_vehicles_are_found_by_name_and_number() -> None:
+    assert len(vehicle_types()) == 4
+    for each in vehicle_types():
+        assert vehicle_type(each.family.key, each.kind) is each
+        for number in each.mav_types:
+            assert vehicle_type_by_numbers(each.family.mav_autopilot, number) is each
+    assert len({each.mav_autopilot for each in families().values()}) == len(families())
+    assert vehicle_type_by_numbers(3, None) is ARDUCOPTER
+    assert vehicle_type_by_numbers(3, 10) is None
+    with pytest.raises(InputError, match="betaflight copter is unknown; known are ardupilot"):
+        _ = Vehicle("betaflight").type

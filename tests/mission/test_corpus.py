@@ -12,9 +12,7 @@ from faao_mav.mission.fence import RallyPoint
 from faao_mav.mission.formats import read_mission, read_mission_file
 
 FOLDER = Path(__file__).parent.parent / "data" / "missions"
-EXPECTED = dict(
-    line.split("\t") for line in (FOLDER / "expected.tsv").read_text().splitlines()[1:]
-)
+EXPECTED = dict(line.split("\t") for line in (FOLDER / "expected.tsv").read_text().splitlines()[1:])
 
 TAKEOFF = (22, (0, 0, 0, 0), 30)
 SPEED = (178, (1, 5, -1, 0), 0)

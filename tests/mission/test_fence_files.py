@@ -68,7 +68,9 @@ def test_words_tell_zones_to_stay_in_and_out_of_no_case_or_layer_lets_into_one()
             key.upper(): value.upper() if isinstance(value, str) and " " in value else value
             for key, value in said.items()
         }
-        for told in (said, upper, {key.lower(): said[key] for key in said}) if kind == "out" else ():
+        for told in (
+            (said, upper, {key.lower(): said[key] for key in said}) if kind == "out" else ()
+        ):
             assert inclusion(told) is inclusion(told, name="my field") is False
     assert inclusion({"name": "school"}, name="no-fly zones") is False
     with pytest.raises(MissionFileError, match=r"tells both to stay in .keep in. and to stay out"):

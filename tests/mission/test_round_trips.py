@@ -5,50 +5,14 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
+from random_missions import missions
 
 from faao_mav.mission import Home, Mission, MissionItem
-from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 from faao_mav.mission.formats import PlanTarget, render_files, write_qgc_plan
 from faao_mav.mission.formats.qgc_plan import read_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence, write_wpl, write_wpl_fence
 
 PX4, ARDUPILOT = PlanTarget(12, 2), PlanTarget(3, 2, takes_null=False)
-
-numbers = st.floats(allow_nan=False, allow_infinity=False)
-settable = numbers | st.just(math.nan)
-latitudes, longitudes = st.floats(-90, 90), st.floats(-180, 180)
-places = st.tuples(latitudes, longitudes)
-points = st.builds(RallyPoint, latitudes, longitudes, numbers)
-circles = st.builds(Circle, places, st.floats(1e-3, 1e6), st.booleans())
-polygons = st.builds(Polygon, st.lists(places, min_size=3, max_size=5).map(tuple), st.booleans())
-fences = st.builds(
-    Fence, st.lists(polygons, max_size=2).map(tuple), st.lists(circles, max_size=2).map(tuple)
-)
-homes = st.builds(Home, latitudes, longitudes, st.floats(1, 9000))
-
-
-@st.composite
-def items(draw: st.DrawFn) -> MissionItem:
-    frame = draw(st.integers(0, 255))
-    x, y = (numbers, numbers) if frame == 2 else (latitudes, longitudes)
-    command = draw(st.integers(0, 65_535).filter(lambda number: number != 177))
-    params = draw(st.tuples(settable, settable, settable, settable))
-    x, y = x | st.just(math.nan), y | st.just(math.nan)
-    return MissionItem(
-        command, frame, params, draw(x), draw(y), draw(settable), draw(st.booleans())
-    )
-
-
-@st.composite
-def missions(draw: st.DrawFn) -> Mission:
-    flown: list[MissionItem] = draw(st.lists(items(), max_size=5))
-    with_jump: bool = draw(st.booleans())
-    if flown and with_jump:
-        target: int = draw(st.integers(1, len(flown) + 1))
-        flown.append(MissionItem(177, 2, (float(target), draw(numbers), 0.0, math.nan)))
-    fence = dataclasses.replace(draw(fences), breach_return=draw(st.none() | points))
-    rally = tuple(draw(st.lists(points, max_size=2)))
-    return Mission(tuple(flown), draw(st.none() | homes), fence, rally)
 
 
 def zeroed(mission: Mission) -> tuple[MissionItem, ...]:
