@@ -4,7 +4,7 @@ import os
 import socket
 from collections.abc import Callable
 from dataclasses import fields
-from functools import partial
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -144,6 +144,7 @@ def planned_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Plans of the same text are solved for the first who asks."""
 
     def once(work: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(work)  # doctests are those of `work`
         def solve(plan: Plan, *, observe: Any = None, bound: bool = False, **parts: Any) -> Any:
             del observe
             options = parts | ({"bound": True} if bound else {})

@@ -8,10 +8,7 @@ from conftest import MISSIONS, edited
 
 from faao_mav.arrays import Real
 from faao_mav.plan import Plan, parse_plan
-
-
-def _box(west: float, south: float, east: float, north: float) -> dict[str, Any]:
-    return {"polygon": [[west, south], [east, south], [east, north], [west, north]]}
+from faao_mav.plan.yaml_text import load_yaml
 
 
 def _random_polygons(count: int, seed: int) -> list[dict[str, Any]]:
@@ -39,30 +36,10 @@ ELSEWHERE = {
 """Where the fence of `FILE` lies: 453 m by 445 m, with a circle of 25.5 m in the middle."""
 
 FENCES: Mapping[str, dict[str, Any]] = {
-    "a wall between the stations": {"exclusion": [_box(100, 140, 290, 150)]},
-    "a gap 15 m wide": {
-        "exclusion": [
-            {"polygon": [[-100, -110], [-90, -120], [142.5, 112.5], [132.5, 122.5]]},
-            {"polygon": [[153.1, 123.1], [143.1, 133.1], [600, 590], [610, 580]]},
-        ]
-    },
-    "a U around the user": {
-        "exclusion": [_box(220, 200, 230, 350), _box(230, 340, 350, 350), _box(350, 200, 360, 350)]
-    },
-    "a zone over the base station": {"exclusion": [{"center": [0, 0], "radius": 90}]},
-    "a circle on the straight line": {"exclusion": [{"center": [170, 170], "radius": 40}]},
-    "two ways round of different worth": {"exclusion": [_box(120, 20, 190, 260)]},
-    "inclusion with a bay": {
-        "inclusion": [
-            [-50, -50], [400, -50], [400, 400], [250, 400], [230, 200], [200, 400], [-50, 400],
-        ]
-    },
-    "zones that touch": {
-        "exclusion": [_box(120, 120, 180, 180), _box(180, 180, 240, 240), _box(180, 120, 240, 180)]
-    },
+    **load_yaml((MISSIONS.parent / "tests/data/fences/plans.yaml").read_text(), "plans.yaml"),
     "a fence from a file": {"file": str(MISSIONS.parent / FILE)},
     "forty random polygons": {"exclusion": _random_polygons(40, 7)},
-}  # fmt: skip
+}
 
 
 def fenced(name: str, **changes: Any) -> Plan:

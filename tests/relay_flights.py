@@ -5,7 +5,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from conftest import FLYABLE, edited
-from hypothesis import settings
 
 from faao_mav.arrays import Real
 from faao_mav.mission import Command, Frame, Mission
@@ -13,9 +12,6 @@ from faao_mav.plan import Plan, parse_plan
 from faao_mav.schedule import Conversion, convert
 from faao_mav.schedule.assemble import assemble
 from faao_mav.schedule.route import initial_route
-
-STEADY = settings(derandomize=True, deadline=None, max_examples=80)
-"""The same examples on every run."""
 
 Trajectory: TypeAlias = tuple[Real, Real]
 

@@ -85,16 +85,13 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
         pytest.fail(" -> ".join(error.args[1]))
 
 
-def test_every_public_name_can_be_had() -> None:
+def test_every_public_name_can_be_had_and_the_package_is_a_program() -> None:
     assert faao_mav.__all__ == sorted(faao_mav.__all__)
     assert all(getattr(faao_mav, name).__doc__ for name in faao_mav.__all__)
     assert set(faao_mav.__all__) < set(dir(faao_mav))
     assert set(re.findall(r"`(\w+)`", faao_mav.__doc__ or "")) == set(faao_mav.__all__)
     with pytest.raises(AttributeError):
         faao_mav.missing  # noqa: B018
-
-
-def test_the_package_is_a_program_with_a_version() -> None:
     command = [sys.executable, "-m", "faao_mav", "--version"]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert told == f"faao-mission {faao_mav.__version__}\n"

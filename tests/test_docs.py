@@ -124,7 +124,11 @@ def test_commands_that_are_not_run_have_options_that_exist() -> None:
     assert wrong == []
 
 
-def test_what_pages_name_and_link_to_exists_and_tables_have_a_head() -> None:
+def test_what_pages_name_and_link_to_exists_and_the_readme_is_short() -> None:
+    assert 700 <= len(PAGES["README.md"].split()) <= 900
+    rows = re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
+    shown = {int(floor): set(re.findall(r"`(\w+)`", rooms)) for floor, rooms in rows}
+    assert shown == {floor: set(rooms) for floor, rooms in enumerate(FLOORS, start=1)}
     rooms = r"`((?:faao_mav|tests|missions|docs)/[\w./-]*|\.ci/run)`"
     for page, text in PAGES.items():
         named = [ROOT / name for name in re.findall(rooms, text)]
@@ -185,16 +189,6 @@ def test_an_example_runs(name: str, tmp_path: Path) -> None:
     ]
     subprocess.run(command, cwd=tmp_path, timeout=PATIENCE, check=True)
     assert {path.name for path in tmp_path.iterdir()} == LEFT[name]
-
-
-def test_the_house_that_is_shown_has_the_floors_of_the_house() -> None:
-    rows = re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
-    shown = {int(floor): set(re.findall(r"`(\w+)`", rooms)) for floor, rooms in rows}
-    assert shown == {floor: set(rooms) for floor, rooms in enumerate(FLOORS, start=1)}
-
-
-def test_the_readme_is_short() -> None:
-    assert 700 <= len(PAGES["README.md"].split()) <= 900
 
 
 def test_the_site_builds_without_a_warning_and_fetches_nothing(tmp_path: Path) -> None:

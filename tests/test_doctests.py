@@ -13,12 +13,9 @@ ROOMS = sorted(module.name for module in pkgutil.iter_modules(faao_mav.__path__)
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_examples_in_docstrings(
-    room: str, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
+@pytest.mark.usefixtures("planned_once")
+def test_examples_in_docstrings(room: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(Path(__file__).parents[1])  # examples read missions/
-    if room not in ("optimizer", "workflow"):  # whose own examples doctest would not find
-        request.getfixturevalue("planned_once")
     first = import_module(f"faao_mav.{room}")
     inside = pkgutil.walk_packages(getattr(first, "__path__", []), f"{first.__name__}.")
     for module in (first, *(import_module(found.name) for found in inside)):

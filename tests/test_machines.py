@@ -11,7 +11,7 @@ from processors import NARROW, SAME_RATE, planned
 @pytest.fixture(params=["direct", pytest.param("algorithm1", marks=pytest.mark.slow)])
 def plan_file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     of_each: dict[str, dict[str, Any]] = {
-        "direct": {"radio.fading": "ergodic", "radio.causal": True},
+        "direct": {"radio.fading": "ergodic", "radio.fading_samples": 8, "radio.causal": True},
         "algorithm1": {"radio.fading": "realization", "optimizer.method": "algorithm1"},
     }
     path = tmp_path / "plan.yaml"

@@ -32,22 +32,33 @@ def complaints(found: Check) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("name", "autopilot", "parameters"),
+    "way",
     [
-        ("copter_relay", "ardupilot", "recommend"),
-        ("copter_relay", "px4", "recommend"),
-        ("paper_active", "ardupilot", "keep"),
+        "copter_relay ardupilot recommend takeoff rtl",
+        "copter_relay px4 recommend takeoff rtl",
+        "paper_active ardupilot keep takeoff land",
+        "paper_active ardupilot keep airborne rtl",
+        "copter_relay ardupilot keep airborne hover",
+        "paper_active px4 keep airborne land",
+        "copter_relay px4 keep takeoff hover",
     ],
 )
-def test_the_sample_plans(name: str, autopilot: str, parameters: str) -> None:
-    text = (MISSIONS / f"{name}.yaml").read_text()
-    changes: dict[str, Any] = {"vehicle.autopilot": autopilot, "mission.parameters": parameters}
-    changes |= {"radio.fading_samples": 4, "optimizer.max_iterations": 2}
-    _, found = checked(text, SHORT | changes)
-    told = complaints(found)
+def test_the_sample_plans_and_all_ways_to_begin_and_end(way: str) -> None:
+    name, autopilot, parameters, begins, ends = way.split()
+    changes = SHORT | {
+        "vehicle.autopilot": autopilot,
+        "mission.parameters": parameters,
+        "mission.takeoff": begins == "takeoff",
+        "mission.on_finish": ends,
+        "radio.fading": "none",
+        "optimizer.max_iterations": 2,
+    }
+    _, found = checked((MISSIONS / f"{name}.yaml").read_text(), changes)
+    told = {each.split(":")[0] for each in complaints(found)}
     if parameters == "keep":  # the defaults may be too slow for a plan, and that is said
-        told = [each for each in told if not each.startswith("link-")]
-    assert told == []
+        told = {rule for rule in told if not rule.startswith("link-")}
+    in_the_air = begins == "airborne" and autopilot == "ardupilot"
+    assert told == ({"ardupilot-begins-in-the-air"} if in_the_air else set())
 
 
 def test_the_sample_plane() -> None:
@@ -63,30 +74,6 @@ def test_the_sample_plane() -> None:
     assert found.link is not None
     assert found.link.share > 0.98
     assert conversion.vehicle.kind == "plane"
-
-
-@pytest.mark.parametrize(
-    ("autopilot", "takeoff", "finish"),
-    [
-        ("ardupilot", True, "land"),
-        ("ardupilot", False, "rtl"),
-        ("ardupilot", False, "hover"),
-        ("px4", False, "land"),
-        ("px4", True, "hover"),
-    ],
-)
-def test_all_ways_to_begin_and_end(autopilot: str, takeoff: bool, finish: str) -> None:
-    changes = {
-        "vehicle.autopilot": autopilot,
-        "mission.takeoff": takeoff,
-        "mission.on_finish": finish,
-        "mission.parameters": "keep",
-        "radio.fading": "none",
-        "flight.time_step": 1,
-    }
-    _, found = checked(SMALL, SHORT | changes)
-    rules = {each.split(":")[0] for each in complaints(found) if not each.startswith("link-")}
-    assert rules == (set() if takeoff or autopilot == "px4" else {"ardupilot-begins-in-the-air"})
 
 
 def test_a_fast_px4_is_told_to_fly_so_fast() -> None:

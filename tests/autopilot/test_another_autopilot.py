@@ -26,14 +26,11 @@ from faao_mav.autopilot.px4.flight_model import Px4
 from faao_mav.cli.main import app
 from faao_mav.errors import PlanError
 from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.formats import read_mission
 from faao_mav.mission.formats.parameter_file import render_parameters
 from faao_mav.mission.item import MissionItem
-from faao_mav.optimizer.optimize import optimize
 from faao_mav.plan import parse_plan
-from faao_mav.schedule import convert
 from faao_mav.sim import MockAutopilot, behaviour_of
-from faao_mav.validate import Limits, check
+from faao_mav.validate import check
 from faao_mav.workflow import plan_mission
 
 TOY = AutopilotFamily(
@@ -101,31 +98,6 @@ def registered() -> Iterator[None]:
     unregister(COPTER)
 
 
-def test_a_mission_is_made_predicted_and_validated_by_its_dialect_and_table() -> None:
-    plan = parse_plan(PLAN)
-    assert plan.aircraft.type is COPTER
-    solution = optimize(plan)
-    conversion = convert(solution)
-    assert conversion.parameters in plan.candidates
-    assert conversion.parameters["TOY_SPEED"] == 8.0
-    assert conversion.schedule.deviation.rms < 3
-    found = check(
-        conversion.mission, conversion.vehicle, limits=Limits(max_speed=8.0), solution=solution
-    )
-    assert found.track is not None
-    assert found.track.position[:, 2].max() == pytest.approx(40, abs=1)
-    assert [f.rule for f in found.findings if f.level == "error"] == []
-    assert not [f for f in found.findings if f.rule.startswith(("px4", "ardupilot"))]
-
-    spline = MissionItem(Command.NAV_SPLINE_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=47, y=8, z=30)
-    mission = conversion.mission
-    judged = check(replace(mission, items=(*mission.items, spline)), Vehicle("toy"))
-    assert "refused-on-upload" in {finding.rule for finding in judged.findings}
-    full = check(replace(mission, items=mission.items * 99), Vehicle("toy"))
-    message = next(f.message for f in full.findings if f.rule == "storage-full")
-    assert message.endswith("ToyCopter stores 500 at most (NO_SPACE)")
-
-
 def test_its_files_and_numbers_are_known_while_it_is() -> None:
     assert parameter_path(MISSIONS / "x.plan", "toy").name == "x.toy"
     assert autopilot_of({"TOY_SPEED": 1.0}) == "toy"
@@ -140,15 +112,35 @@ def test_its_files_and_numbers_are_known_while_it_is() -> None:
         register(COPTER)
 
 
-def test_it_is_uploaded_to_its_mock_and_flown_there(tmp_path: Path) -> None:
-    result = plan_mission(parse_plan(edited(PLAN, {"mission.parameters": "keep"})))
-    mission, *_ = result.write(tmp_path / "m.plan")
-    home = read_mission(mission).home
-    assert home is not None
-    mock = MockAutopilot(behaviour_of("px4", family=TOY), home=home, beat=0.1, speedup=50.0)
+def test_a_mission_is_made_and_judged_by_its_dialect_and_table_and_flown(tmp_path: Path) -> None:
+    plan = parse_plan(PLAN)
+    assert plan.aircraft.type is COPTER
+    result = plan_mission(plan)
+    conversion, found = result.conversion, result.check
+    assert conversion is not None
+    assert found is not None
+    assert conversion.parameters in plan.candidates
+    assert conversion.parameters["TOY_SPEED"] == 8.0
+    assert conversion.schedule.deviation.rms < 3
+    assert found.track is not None
+    assert found.track.position[:, 2].max() == pytest.approx(40, abs=1)
+    assert [f.rule for f in found.findings if f.level == "error"] == []
+    assert not [f for f in found.findings if f.rule.startswith(("px4", "ardupilot"))]
+    spline = MissionItem(Command.NAV_SPLINE_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=47, y=8, z=30)
+    mission = conversion.mission
+    judged = check(replace(mission, items=(*mission.items, spline)), Vehicle("toy"))
+    assert "refused-on-upload" in {finding.rule for finding in judged.findings}
+    full = check(replace(mission, items=mission.items * 99), Vehicle("toy"))
+    message = next(f.message for f in full.findings if f.rule == "storage-full")
+    assert message.endswith("ToyCopter stores 500 at most (NO_SPACE)")
+
+    path, *_ = result.write(tmp_path / "m.plan")
+    assert mission.home is not None
+    mock = MockAutopilot(behaviour_of("px4", family=TOY), home=mission.home, beat=0.1, speedup=50.0)
     to = f"127.0.0.1:{free_port()}"
     with running(mock, f"udpin:{to}"):
-        for command in (("upload", mission), ("fly", mission, "--arm", "--json")):
+        tuned = ("--parameters", path.with_suffix(".toy"))
+        for command in (("upload", path, *tuned), ("fly", path, "--arm", "--json")):
             arguments = [str(each) for each in (*command, "--to", f"udpout:{to}")]
             done = CliRunner().invoke(app, arguments)
             assert done.exit_code == 0, done.output
