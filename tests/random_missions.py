@@ -11,7 +11,7 @@ from faao_mav.mission.fence import Circle, Fence, Polygon, RallyPoint
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 odd = st.sampled_from([0.0, -0.0, math.nan, 1e-320, 1e300, -1e300, -1.0, 1.0, 2.7, 255.5, 65_536.0])
 values = odd | st.floats(-200, 200) | numbers | st.just(math.nan)
-commands = st.sampled_from([*Command]) | st.integers(0, 65_535)
+commands = st.sampled_from([*map(int, Command)]) | st.integers(0, 65_535)
 frames = st.sampled_from([0, 2, 3, 5, 6, 10, 11]) | st.integers(0, 255)
 latitudes = st.floats(-90, 90) | st.floats(-35.4, -35.3)
 longitudes = st.floats(-180, 180) | st.floats(149.1, 149.2)
@@ -34,7 +34,7 @@ def items(draw: st.DrawFn, *, sound: bool) -> MissionItem:
     command, frame = draw(commands), draw(frames)
     x, y = (values, values) if frame == 2 or not sound else (latitudes, longitudes)
     if sound and command == Command.DO_JUMP:
-        command = Command.NAV_WAYPOINT
+        command = int(Command.NAV_WAYPOINT)
     params = draw(st.tuples(values, values, values, values))
     x, y = x | st.just(math.nan), y | st.just(math.nan)
     return MissionItem(command, frame, params, draw(x), draw(y), draw(values), draw(st.booleans()))

@@ -115,9 +115,6 @@ def test_one_point_is_only_held(model: Model) -> None:
     np.testing.assert_allclose(flown.position, np.tile([3, 4, 30], (len(flown.t), 1)))
 
 
-# ---- ArduCopter
-
-
 def test_the_lean_angle_and_the_body_bound_its_speed() -> None:
     for vehicle, top in (
         (Vehicle(parameters={"ANGLE_MAX": 3000}), 10.3),  # measured
@@ -142,9 +139,6 @@ def test_a_corner_with_little_acceleration_takes_longer() -> None:
     assert own + 0.5 < tight
 
 
-# ---- PX4
-
-
 def test_a_wide_radius_before_a_small_one_costs_speed() -> None:
     """Flown by PX4 at 8 m/s round 15 degrees: 5.6 m/s with 9.9 m before 1.5 m."""
     for radii, slowest in (([2, 9.9, 1.5, 2], 5.6), ([2, 9.9, 9.9, 2], 7.8)):
@@ -154,9 +148,6 @@ def test_a_wide_radius_before_a_small_one_costs_speed() -> None:
         about = abs(flown.t - flown.arrivals[1]) < 2.5
         speed = np.linalg.norm(flown.velocity[about], axis=1).min()
         assert speed == pytest.approx(slowest, abs=0.5)
-
-
-# ---- ArduPlane
 
 
 @settings(max_examples=8)

@@ -1,6 +1,5 @@
 """The rules: each speaks and is silent on both sides of its limit, and what holds for all."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +34,6 @@ def test_every_rule_is_tried_and_can_be_cited() -> None:
     assert {row[0] for row in ROWS} | others == {rule.id for rule in RULES}
     assert len({rule.id for rule in RULES}) == len(RULES)
     for rule in RULES:
-        assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", rule.id)
         assert rule.summary
         assert rule.source
 
@@ -127,8 +125,6 @@ def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> Non
         assert found
         for finding in found:
             assert not finding.rule.startswith(other)
-            assert finding.action == finding.action.strip()
-            assert not finding.action.endswith(".")
 
 
 def test_worst_first_then_by_item_and_nothing_of_a_sound_mission() -> None:
