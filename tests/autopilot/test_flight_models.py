@@ -148,6 +148,7 @@ def test_a_wide_radius_before_a_small_one_costs_speed() -> None:
         about = abs(flown.t - flown.arrivals[1]) < 2.5
         speed = np.linalg.norm(flown.velocity[about], axis=1).min()
         assert speed == pytest.approx(slowest, abs=0.5)
+    assert SUITED.radii(np.ones(2), np.zeros(2), np.ones(2, dtype=bool)).min() >= 1  # a metre
 
 
 @settings(max_examples=8)

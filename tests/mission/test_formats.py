@@ -141,7 +141,7 @@ def test_files_by_their_ending_the_fence_of_text_files_beside_them(tmp_path: Pat
                 assert (row.command, row.frame) == (item.command, item.frame)
                 params = (row.param1, row.param2, row.param3, row.param4)
                 assert (*params, row.x, row.y, row.z) == item.numbers
-    for name, content, told in (
+    for other, content, told in (
         ("flight", b"", "no ending; expected a name that ends in .waypoints"),
         ("x.kml", b"<kml>", "KML is written for drawing and lacks"),
         ("x.txt", None, "cannot be read: No such file"),
@@ -149,9 +149,9 @@ def test_files_by_their_ending_the_fence_of_text_files_beside_them(tmp_path: Pat
         ("x.plan", b"[" * 100_000, "nested too deep for a plan"),
     ):
         if content is not None:
-            (tmp_path / name).write_bytes(content)
-        with pytest.raises(MissionFileError, match=f"{name}: {told}"):
-            read_mission(tmp_path / name)
+            (tmp_path / other).write_bytes(content)
+        with pytest.raises(MissionFileError, match=f"{other}: {told}"):
+            read_mission(tmp_path / other)
 
 
 MISSION_PLANNER = """QGC WPL 110
