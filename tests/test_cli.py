@@ -152,8 +152,8 @@ def test_bound_and_algorithm_1_by_option(plan: Path) -> None:
 
 def test_what_is_made_of_a_plan_for_px4_and_a_plane(plan: Path, tmp_path: Path) -> None:
     plan.write_text(edited(GENTLE, {"vehicle.autopilot": "px4"}))
-    for order in (["m.waypoints", plan], ["m.plan", "plan", plan], ["m.kml", "--quiet", plan]):
-        assert run(*order[1:], "--out", tmp_path / order[0], "--quiet").output == ""
+    for name, words in (("m.waypoints", ""), ("m.plan", "plan"), ("m.kml", "")):
+        assert run(*words.split(), plan, "--out", tmp_path / name, "--quiet").output == ""
     read = read_mission_file(tmp_path / "m.plan")
     assert (read.firmware, read.vehicle_type) == (12, 2)
     assert read.mission == read_mission(tmp_path / "m.waypoints")
@@ -390,7 +390,7 @@ def test_as_a_program(tmp_path: Path) -> None:
 
 
 TINY = edited(FLYABLE, {"flight.duration": 3, "flight.end": [5, 45], "optimizer.max_iterations": 1})
-ODD = [
+ODD: list[Any] = [
     None,
     True,
     False,

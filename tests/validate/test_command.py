@@ -80,11 +80,11 @@ def test_who_flies_it_within_which_limits(write: Write) -> None:
     slower = sound.with_name("plan.yaml")
     slower.write_text(edited(FLYABLE, {"vehicle.max_speed": 7, "flight.duration": 13}))
     asked = ("--max-altitude", 20, "--max-distance", 150, "--max-duration", 30)
-    for options, rules in (
+    for limits, rules in (
         (("--plan", slower), {"speed-above-limit"}),
         (asked, {"above-ceiling", "beyond-distance", "too-long"}),
     ):
-        assert rules <= {each["rule"] for each in found(sound, *options)["findings"]}
+        assert rules <= {each["rule"] for each in found(sound, *limits)["findings"]}
     duration = found(sound)["predicted"]["duration"]
     kept, broken = (run(sound, "--max-duration", share * duration) for share in (1.01, 0.5))
     assert f"predicted flight: {duration:.0f} s" in kept.stdout
