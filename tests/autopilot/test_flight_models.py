@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot import FlightPath, Model, Vehicle
 from faao_mav.autopilot.ardupilot.copter import ArduCopter
+from faao_mav.autopilot.ardupilot.legs import StraightLegs
 from faao_mav.autopilot.ardupilot.plane import ArduPlane
+from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import CopterBody, PlaneBody
 from faao_mav.autopilot.px4 import Px4
 from faao_mav.errors import InputError
@@ -137,6 +139,25 @@ def test_a_corner_with_little_acceleration_takes_longer() -> None:
     )
     assert own == pytest.approx(wide, abs=0.01)
     assert own + 0.5 < tight
+
+
+def test_legs_take_as_long_as_the_target_takes() -> None:
+    rng, worst = np.random.default_rng(1), []
+    for _ in range(100):
+        count = int(rng.integers(2, 7))
+        lengths, stops = rng.uniform(8, 120, count), np.ones(count + 1, dtype=bool)
+        stops[1:-1] = rng.random(count - 1) < 0.2
+        speeds = rng.uniform(1.5, 10, count)
+        limits = ArduCopter(acceleration=rng.uniform(1.5, 5), jerk=rng.uniform(5, 20))
+        points = np.zeros((count + 1, 3))
+        points[1:, 0] = np.cumsum(lengths)
+        legs = StraightLegs(lengths, ~stops[:-1], limits)
+        target = Target(points, speeds, np.zeros(count + 1, dtype=bool), stops, limits)
+        worst.append(np.abs(legs.flown(speeds)[1] - np.diff(target.passed)).max())
+        most = np.minimum(speeds, legs.most)  # what is commanded above makes no difference
+        np.testing.assert_allclose(legs.flown(most)[1], legs.flown(speeds)[1])
+    assert np.median(worst) < 0.05
+    assert np.quantile(worst, 0.9) < 0.3
 
 
 def test_a_wide_radius_before_a_small_one_costs_speed() -> None:
