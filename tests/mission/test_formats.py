@@ -267,7 +267,7 @@ def test_what_a_format_cannot_hold_is_told() -> None:
         (terrain, "x.kml", None, (
             "KML holds route and fence alone: no commands, speeds or holds, and cannot be read "
             "back",
-            "heights above terrain are drawn above Google Earth's own",
+            "heights above terrain, or above a home without a height, are drawn above the ground",
             "spline waypoints are joined by straight lines",
         )),
     ):  # fmt: skip
