@@ -10,12 +10,12 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 from faao_mav.autopilot import Track
 from faao_mav.errors import InputError, LinkError
 from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.stream import Stream
-from faao_mav.fly.telemetry import POSITION_RATE, Ending, read_held
+from faao_mav.fly.telemetry import POSITION_RATE, Ending
 from faao_mav.fly.watch import BEFORE, Watch
 from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.precoder_table import check_of_slots, taken_by
@@ -26,6 +26,7 @@ from faao_mav.validate.rule import Finding, Level, by_rule, count_of, line_of
 from faao_mav.vector import lengths
 from faao_mav.wire.client import LinkOptions, Session
 from faao_mav.wire.discover import FoundVehicle
+from faao_mav.wire.jobs import read_held
 from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.wire_items import Difference, wire_items
 
@@ -35,8 +36,7 @@ _NEAR = 20.0
 _PERIOD = 1.0
 """Seconds between two lines, by the world's clock and by the vehicle's (a simulator's is quick)."""
 
-_NO_VOLTAGE = 65_535
-"""What SYS_STATUS says of a voltage that is not known."""
+_NO_VOLTAGE = 65_535  # What SYS_STATUS says of a voltage that is not known.
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +89,15 @@ def fly_mission(
         if peer.vehicle is None:
             raise LinkError(f"{connection}: {vehicle}: flights of it are not watched")
         lists = {part: wire_items(flight.mission, part, peer.vehicle) for part in MissionType}
+        lists = {part: sent for part, sent in lists.items() if sent}
         # A vehicle that flies already is not judged, and not kept busy.
         judged = arm or flight.streamed or not vehicle.armed
-        asked = tuple(part for part in MissionType if judged or lists[part])
-        held = session.run(read_held(peer, asked, parameters=judged))
-        wrong = list[Difference]()
+        asked = tuple(MissionType if judged else lists)
+        held, wrong = session.run(read_held(peer, asked, parameters=judged)), list[Difference]()
         for part, sent in lists.items():
-            if sent and part in held.missing:
+            if part in held.missing:
                 raise LinkError(f"{connection}: {session.not_read(held.missing[part])}")
-            wrong += held.other_than(sent, part, peer.vehicle) if sent else ()
+            wrong += held.other_than(sent, part, peer.vehicle)
         if wrong:
             return FlightReport(vehicle, tuple(wrong), None, FlightRecord.of(()))
         gate = Clearance(flight, peer, held, elsewhere, untimed, judged)
@@ -107,8 +107,7 @@ def fly_mission(
             watch = Watch(gate, arm=arm, lands=lands, rate=rate)
         watch.seen.strangers = session.strangers
         try:
-            beats = arm or watch.streams
-            ending = session.watch(watch, lambda: watching(watch), beats=beats)
+            ending = session.watch(watch, lambda: watching(watch), beats=arm or watch.streams)
         except LinkError as error:
             ending = Ending("lost", str(error))
     found = gate.findings or ()
@@ -153,18 +152,13 @@ class Radios:
         slot = min(int(max(planned, 0.0) / step + 1e-9), len(solution.t) - 1)
         if slot == self._last:
             return None
-        self._last = slot
-        told = {
-            "slot": slot,
-            "t": t,
-            "east": float(w[0]),
-            "north": float(w[1]),
-            "P_B": _pairs(solution.P_B[slot]),
-            "P_U": _pairs(solution.P_U[slot]),
-            "receive_share": None if solution.shares is None else float(solution.shares[slot]),
-            "step_B": None if solution.steps is None else int(solution.steps[0][slot]),
-            "step_U": None if solution.steps is None else int(solution.steps[1][slot]),
-        }
+        self._last, P = slot, (solution.P_B[slot], solution.P_U[slot])
+        P_B, P_U = (np.stack([each.real, each.imag], axis=-1).tolist() for each in P)
+        told = {"slot": slot, "t": t, "east": float(w[0]), "north": float(w[1])}
+        told |= {"P_B": P_B, "P_U": P_U}
+        told["receive_share"] = None if solution.shares is None else float(solution.shares[slot])
+        for n, name in enumerate(("step_B", "step_U")):
+            told[name] = None if solution.steps is None else int(solution.steps[n][slot])
         return json.dumps(told)
 
     def tell(self, t: float | None, w: Real) -> None:
@@ -173,11 +167,6 @@ class Radios:
         if line is not None:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link, suppress(OSError):
                 link.sendto(f"{line}\n".encode(), self._to)
-
-
-def _pairs(P: Complex) -> list[list[list[float]]]:
-    pairs: list[list[list[float]]] = np.stack([P.real, P.imag], axis=-1).tolist()
-    return pairs
 
 
 class Telling:
@@ -256,13 +245,11 @@ class Telling:
         if start is None:
             return None
         stands = flown.standing(solution, self._line, record.line(solution, start))
-        if stands.over:
-            return None
         told = asdict(stands)
         for name in ("delivered", "expected"):
             rate = told[name] / solution.plan.flight.duration
             told[f"{name}_mbytes"] = solution.plan.megabytes(rate)
-        return told
+        return None if stands.over else told
 
 
 def findings_text(findings: Sequence[Finding]) -> str:

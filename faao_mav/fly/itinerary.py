@@ -5,14 +5,14 @@ The `Itinerary` asks it about each.
 """
 
 import math
-from collections.abc import Callable
-from typing import Literal, TypeAlias
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InfeasibleError
-from faao_mav.fly.setpoints import Course, Setpoint, at_rest
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import way_between, way_home, way_out
@@ -61,6 +61,100 @@ or not, until it is given up; and after which the plan has passed by where it wa
 """
 
 
+class Setpoint(NamedTuple):
+    """Position, m, velocity, m/s, and acceleration, m/s², each (3,) east, north, up."""
+
+    position: Real
+    velocity: Real
+    acceleration: Real
+
+
+def at_rest(place: Real) -> Setpoint:
+    """Return the setpoint of an aircraft that stays at `place` (3,), m."""
+    return Setpoint(place, np.zeros(3), np.zeros(3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """Pieces of constant acceleration, which begin at `t` (k,), s.
+
+    When a piece begins the aircraft is at `p` (k, 3), m east, north, up, with the velocity `v`
+    (k, 3), m/s; until the next it has the acceleration `a` (k, 3), m/s². In the last piece it
+    stands still.
+
+    >>> course = Course.through([[0, 0, 10], [20, 0, 10]], [(4.0, 2.0)])
+    >>> course.end
+    7.0
+    >>> course.at(3.0).position.tolist(), course.at(3.0).velocity.tolist()
+    ([8.0, 0.0, 10.0], [4.0, 0.0, 0.0])
+    """
+
+    t: Real
+    p: Real
+    v: Real
+    a: Real
+
+    @classmethod
+    def through(
+        cls, places: Sequence[Sequence[float]] | Real, limits: Sequence[tuple[float, float]]
+    ) -> "Course":
+        """Return the quickest flight from rest to rest along each of the legs between `places`.
+
+        They are (k, 3), m; a leg has `limits` of speed, m/s, and acceleration, m/s². It begins at
+        0 s.
+        """
+        corners, rest = np.asarray(places, dtype=float), np.zeros(3)
+        t, pieces = 0.0, list[tuple[float, Real, Real, Real]]()
+        for p, leg, (speed, push) in zip(
+            corners[:-1], np.diff(corners, axis=0), limits, strict=True
+        ):
+            length = float(np.linalg.norm(leg))
+            if length < 1e-6:
+                continue
+            along, top, v = leg / length, min(speed, (push * length) ** 0.5), rest
+            ramp, even = top / push, length / top - top / push
+            for lasting, a in ((ramp, push * along), (even, rest), (ramp, -push * along)):
+                pieces.append((t, p, v, a))
+                t, p, v = t + lasting, p + v * lasting + a * lasting**2 / 2, v + a * lasting
+        pieces.append((t, corners[-1], rest, rest))
+        return cls(*(np.array(column) for column in zip(*pieces, strict=True)))
+
+    @classmethod
+    def of(cls, solution: Solution) -> "Course":
+        """Return the planned flight on the plan's clock, from rest to rest at the planned height.
+
+        A flight that begins or ends at speed has a run-in before 0 s, or a run-out, on which it
+        speeds up or slows down along that velocity by half of `vehicle.max_acceleration`.
+        """
+        flight, limit = solution.plan.flight, solution.plan.vehicle.max_acceleration / 2
+        up, rest = [(0, 0), (0, 1)], np.zeros(3)
+        w = np.pad(solution.w, up, constant_values=flight.altitude)
+        v, a = np.pad(solution.v, up), np.pad(solution.a, up)
+        run_in, run_out = (float(np.linalg.norm(v[n])) / limit for n in (0, -1))
+        t = [float(solution.t[0]) - run_in, *solution.t, float(solution.t[-1]) + run_out]
+        p = [w[0] - v[0] * run_in / 2, *w, w[-1] + v[-1] * run_out / 2]
+        pushes = [v[0] / max(run_in, 1e-9), *a[:-1], -v[-1] / max(run_out, 1e-9), rest]
+        return cls(np.array(t), np.array(p), np.array([rest, *v, rest]), np.array(pushes))
+
+    @property
+    def begin(self) -> float:
+        """When it begins, s."""
+        return float(self.t[0])
+
+    @property
+    def end(self) -> float:
+        """From when on it stands still, s."""
+        return float(self.t[-1])
+
+    def at(self, time: float) -> Setpoint:
+        """Return where the aircraft is to be at `time`, s; before it begins, at rest there."""
+        k = int(np.searchsorted(self.t, time, side="right")) - 1
+        if k < 0:
+            return at_rest(self.p[0])
+        p, v, a, since = self.p[k], self.v[k], self.a[k], time - float(self.t[k])
+        return Setpoint(p + v * since + a * since**2 / 2, v + a * since, a)
+
+
 class Gate:
     """The gate of the setpoints for a flight of `plan`: see `believes` and `passes`.
 
@@ -74,8 +168,9 @@ class Gate:
         self._on_course: float | None = None
         self._last: tuple[float, Real] | None = None
         self._jumped_from: tuple[float, Real] | None = None
-        self._moved = 0.0
-        self._doubted_since = math.inf
+        self._moved, self._doubted_since = 0.0, math.inf
+        self.has_lost_it = False
+        """Whether its places have been doubted for too long."""
 
     def passes(self, t: float, place: Real, setpoint: Setpoint) -> bool:
         """Tell whether an aircraft at `place` (3,), m, at `t`, s, may be sent to `setpoint`.
@@ -116,11 +211,8 @@ class Gate:
         elif not doubted and self._doubted_since < math.inf:
             self._doubted_since = math.inf
             self._tell("its place is believed again")
+        self.has_lost_it = t >= self._doubted_since + _BORNE
         return not doubted
-
-    def has_lost_it(self, t: float) -> bool:
-        """Tell whether its places have been doubted for too long by `t`, s."""
-        return t >= self._doubted_since + _BORNE
 
     def _jumps(self, before: tuple[float, Real], t: float, place: Real) -> bool:
         within = _AROUND + _QUICKER * self._speed * (t - before[0])
@@ -163,10 +255,9 @@ class Itinerary:
         self.relay = Course.of(solution)
         first, last = self.relay.p[[0, -1]]
         if plan.keep_in is not None and not plan.keep_in.covers_path(self.relay.p[:, :2]):
-            raise InfeasibleError(
-                "the streamed flight leaves the plan's fence where it speeds up before flight.start"
-                " or slows down after flight.end: give hover for both, or move them"
-            )
+            where = "where it speeds up before flight.start or slows down after flight.end"
+            do = "give hover for both, or move them"
+            raise InfeasibleError(f"the streamed flight leaves the plan's fence {where}: {do}")
         way_out(plan, first[:2])  # raises
         home = np.vstack([last[:2], way_home(plan, last[:2])])
         end = np.append(home[-1], plan.flight.altitude)
@@ -177,6 +268,7 @@ class Itinerary:
         self.relay_start: float | None = None
         self.trouble: str | None = None
         self._time = math.nan
+        self._settled: float | None = None
         self._led, self._meets = False, 0.0
         self._follow(None, 0.0)
 
@@ -188,12 +280,15 @@ class Itinerary:
         passed, self._time = 0.0 if math.isnan(self._time) else t - self._time, t
         low = place[2] < self._plan.flight.altitude - _BELOW
         late = self._arrived is not None and t >= self._arrived + _UNSETTLED
+        away, speed = np.linalg.norm(place - self._ends["out"]), np.linalg.norm(velocity)
+        rests = self._arrived is not None and away <= _SETTLED and speed <= _STILL
+        self._settled = (self._settled or t) if rests else None
         match self.part:
             case "take-off" if self._takes_off and (low or abs(velocity[2]) >= _LEVEL):
                 return None
             case "take-off":
                 self._enter("out", t, place)
-            case "out" if self._rests(t, place, velocity) or late:
+            case "out" if late or (self._settled is not None and t >= self._settled + _REST):
                 self.relay_start = t - self.relay.begin
                 self._enter("relay", t, place)
             case "relay" if self._plans(t) >= max(self.relay.end, self._plan.flight.duration):
@@ -220,7 +315,6 @@ class Itinerary:
     def _follow(self, way: Course | None, t: float) -> None:
         """Follow `way` from its beginning; None: the plan."""
         self._way, self._gone = way, 0.0
-        self._settled: float | None = None
         self._arrived: float | None = None
         if not self._led:
             self._until = t + _STUCK + (0.0 if way is None else 2 * way.end)
@@ -294,12 +388,3 @@ class Itinerary:
         high = np.column_stack([corners, np.full(len(corners), self._plan.flight.altitude)])
         limits = self._speed, self._plan.vehicle.max_acceleration
         return Course.through(np.vstack([place, high]), [CLIMB, *[limits] * (len(corners) - 1)])
-
-    def _rests(self, t: float, place: Real, velocity: Real) -> bool:
-        """Tell whether the aircraft rests where the relay flight begins."""
-        away, speed = np.linalg.norm(place - self._ends["out"]), np.linalg.norm(velocity)
-        if self._arrived is None or away > _SETTLED or speed > _STILL:
-            self._settled = None
-            return False
-        self._settled = self._settled or t
-        return t >= self._settled + _REST

@@ -52,8 +52,7 @@ _RADIOS = {"RADIO_STATUS": "rssi", "RADIO": "rssi", "RAD": "RSSI", "radio_status
 
 _ASKED = ["home_position", *_PLACES, *_PARAMETERS, *_WINDS, *_RADIOS]
 
-_UNKNOWN = 255
-"""The level of a radio that does not know it (MAVLink, RADIO_STATUS)."""
+_UNKNOWN = 255  # The level of a radio that does not know it (MAVLink, RADIO_STATUS).
 
 _LARGEST, _MOST_MESSAGES = 2**30, 1_000_000
 """Bytes of a log that is read, and messages about the flight that it has at most; chosen: hours of
@@ -102,11 +101,9 @@ def read_log(path: Path, system: int | None = None) -> "list[FlightRecord]":
     if system is not None and ending != ".tlog":
         raise InputError(f"--system {system}: {path} is the log of one vehicle; that is for .tlog")
     command = [sys.executable, "-P", "-m", __name__, str(path), str(system or 0)]
-    environment = os.environ | _ENVIRONMENT
+    how: dict[str, Any] = {"capture_output": True, "env": os.environ | _ENVIRONMENT}
     try:
-        read = subprocess.run(
-            command, capture_output=True, env=environment, timeout=_PATIENCE, check=False
-        )
+        read = subprocess.run(command, **how, timeout=_PATIENCE, check=False)
     except subprocess.TimeoutExpired:
         text = f"{path}: not read within {_PATIENCE:g} s; expected the log of a flight"
         raise InputError(text) from None
@@ -127,11 +124,11 @@ def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
     autopilot: a companion may have a clock, a position and a wind of its own. Raises `InputError`
     where there is no flight.
     """
-    heard = defaultdict[tuple[int, int], _Heard](_Heard)
+    heard, expected = defaultdict[tuple[int, int], _Heard](_Heard), "expected the log of a flight"
     for count, (number, component, name, fields) in enumerate(said):
         if count == _MOST_MESSAGES:
-            text = f"more than {_MOST_MESSAGES:,} positions, winds and parameters"
-            raise InputError(f"{path}: {text}; expected the log of a flight")
+            what = "positions, winds and parameters"
+            raise InputError(f"{path}: more than {count:,} {what}; {expected}")
         if name in _RADIOS and number:  # told by the radio itself, which has no place
             for each in heard.values():
                 each.hear(name, fields)
@@ -143,14 +140,14 @@ def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
             flown.setdefault(number, each)
     if not flown:
         most = max((len(each.fixes) for each in heard.values()), default=0)
-        raise InputError(f"{path}: {most} positions; expected the log of a flight")
+        raise InputError(f"{path}: {most} positions; {expected}")
     if system and system not in flown:
         numbers = ", ".join(map(str, filter(None, flown)))
         raise InputError(f"--system {system}: not in {path}, where positions are of: {numbers}")
     chosen = {number: each for number, each in flown.items() if system in (0, number)}
     longest = max(each.fixes[-1][0] - each.fixes[0][0] for each in chosen.values())
     if longest > _LONGEST:
-        raise InputError(f"{path}: {longest / 3600:.0f} hours; expected the log of a flight")
+        raise InputError(f"{path}: {longest / 3600:.0f} hours; {expected}")
     return [(each.found(), each.parameters, number) for number, each in chosen.items()]
 
 
@@ -211,10 +208,9 @@ class _Heard:
 
     def found(self) -> list[tuple[float, ...]]:
         """Return the flight; until home is told it is where it is first told, or where it began."""
-        altitudes, homes = ([each[n] for each in self.fixes] for n in (3, 4))
-        first = next(filter(math.isfinite, homes), altitudes[0])
-        told = (home if math.isfinite(home) else first for home in homes)
-        return [(*x[:4], home, *x[5:]) for x, home in zip(self.fixes, told, strict=True)]
+        homes = (each[4] for each in self.fixes)
+        first = next(filter(math.isfinite, homes), self.fixes[0][3])
+        return [(*x[:4], x[4] if math.isfinite(x[4]) else first, *x[5:]) for x in self.fixes]
 
 
 def messages(path: Path) -> Iterator[Said]:
@@ -224,12 +220,12 @@ def messages(path: Path) -> Iterator[Said]:
     the libraries raise.
     """
     ending = path.suffix.lower()
-    return _ulog(path) if ending == ".ulg" else _mavlog(path, own=ending == ".bin")
-
-
-def _mavlog(path: Path, *, own: bool) -> Iterator[Said]:
+    if ending == ".ulg":
+        yield from _ulog(path)
+        return
     from pymavlink import DFReader, mavutil
 
+    own = ending == ".bin"
     try:
         log = DFReader.DFReader_binary(str(path)) if own else mavutil.mavmmaplog(str(path))
     except AttributeError:  # a log that ends in the first message of its kind

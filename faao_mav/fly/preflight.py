@@ -7,18 +7,20 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from faao_mav.autopilot import Vehicle
 from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.autopilot.manners import FenceAction
 from faao_mav.errors import InputError, counted
-from faao_mav.fly.telemetry import Ending, Held, Telemetry, read_held
+from faao_mav.fly.telemetry import Ending, Telemetry
 from faao_mav.mission.item import Home, Mission
+from faao_mav.optimizer.solution import Solution
+from faao_mav.schedule.conversion import Conversion
 from faao_mav.validate import Check, Limits, check
 from faao_mav.validate.rule import Finding, Level, read_rules
 from faao_mav.validate.speeds import beyond_lean
 from faao_mav.wire import whereabouts
+from faao_mav.wire.jobs import Held, read_held
 from faao_mav.wire.machine import Script
 from faao_mav.wire.messages import Message
 from faao_mav.wire.parameters import number_in
@@ -26,10 +28,6 @@ from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.transfer import Peer
 from faao_mav.wire.whereabouts import Whereabouts
 from faao_mav.wire.wire_items import mission_of, wire_items
-
-if TYPE_CHECKING:
-    from faao_mav.optimizer.solution import Solution
-    from faao_mav.schedule.conversion import Conversion
 
 LEAST_BATTERY = 30
 """Percent of the battery with which a flight begins at least, where nothing tells what it takes.
@@ -69,12 +67,12 @@ class Flight:
     mission: Mission
     vehicle: Vehicle = field(default_factory=Vehicle)
     made_for: MadeFor = field(default_factory=MadeFor)
-    solution: "Solution | None" = None
+    solution: Solution | None = None
     streamed: bool = False
 
     @classmethod
     def planned(
-        cls, conversion: "Conversion", solution: "Solution", *, streamed: bool = False
+        cls, conversion: Conversion, solution: Solution, *, streamed: bool = False
     ) -> "Flight":
         """Return the flight of the mission that `solution` was made into."""
         vehicle = conversion.vehicle
@@ -127,22 +125,20 @@ class Clearance:
             return (_found("vehicle-other", mistake=mistake),)
         judged = _judged(flight, held, seen, elsewhere=self.elsewhere)
         found = [
-            *_state(flight, seen),
+            *_state(flight, seen, judged),
             *_place(flight, held, seen),
             *_lists(flight, held, seen, judged.vehicle),
             *_timing(flight, held, seen),
-            *_battery(seen, judged),
             *(each for each in judged.findings if each.level is not Level.NOTE),
             *_by_itself(flight, held, seen, judged.vehicle),
         ]
-        ordered = sorted(map(self._overruled, found), key=lambda each: [*Level].index(each.level))
-        return tuple(ordered)
+        found = [self._overruled(each) for each in found]
+        return tuple(sorted(found, key=lambda each: [*Level].index(each.level)))
 
     def _overruled(self, found: Finding) -> Finding:
         """Return what was found, as a warning where an option allows it."""
-        options = {"place": (self.elsewhere, "elsewhere"), "timing": (self.untimed, "untimed")}
-        allowed, option = options.get(found.rule.partition("-")[0], (False, ""))
-        if not allowed or found.level is not Level.ERROR:
+        option = {"place": "elsewhere", "timing": "untimed"}.get(found.rule.partition("-")[0])
+        if option is None or not getattr(self, option) or found.level is not Level.ERROR:
             return found
         return replace(found, level=Level.WARNING, action=f"--{option}: flown all the same")
 
@@ -191,13 +187,8 @@ def _judged(flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool) -> 
         mission = replace(mission, fence=own.fence, rally=own.rally)
     if seen.place is not None and (elsewhere or Whereabouts.of(seen.place, mission).is_meant):
         mission = replace(mission, home=seen.place)
-    vehicle = replace(
-        flight.vehicle,
-        autopilot=seen.vehicle.family.key,
-        kind=seen.vehicle.kind,
-        parameters=held.reading.values,
-        source="the vehicle",
-    ).usable()
+    kind, values, body = seen.vehicle, held.reading.values, flight.vehicle.body
+    vehicle = Vehicle(kind.family.key, kind.kind, values, "the vehicle", body).usable()
     limits = None if solution is None else Limits(max_speed=solution.plan.vehicle.max_speed)
     found = check(mission, vehicle, limits=limits, solution=solution)
 
@@ -208,7 +199,7 @@ def _judged(flight: Flight, held: Held, seen: Telemetry, *, elsewhere: bool) -> 
     return replace(found, findings=tuple(filter(counts, found.findings)))
 
 
-def _state(flight: Flight, seen: Telemetry) -> Iterator[Finding]:
+def _state(flight: Flight, seen: Telemetry, judged: Check) -> Iterator[Finding]:
     if seen.armed:
         yield _found("armed")
     if seen.stations:
@@ -219,6 +210,16 @@ def _state(flight: Flight, seen: Telemetry) -> Iterator[Finding]:
         yield _found("item-not-first", seen=seen)
     if not flight.streamed and seen.custom_mode in seen.vehicle.modes.not_to_arm_in:
         yield _found("mode", seen=seen)
+    energy, least = judged.energy, float(LEAST_BATTERY)
+    why = "where no plan tells what the flight takes"
+    if energy is not None and energy.battery is not None:
+        takes = 100 * energy.total / energy.battery.capacity_wh
+        least = takes + energy.battery.reserve
+        why = f"the flight takes {takes:.0f} %, and is to leave {energy.battery.reserve:g} %"
+    if seen.battery is None:
+        yield _found("battery-unknown")
+    elif seen.battery < least:
+        yield _found("battery-low", percent=seen.battery, least=least, why=why)
 
 
 def _place(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
@@ -245,7 +246,7 @@ def _place(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
 def _lists(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterator[Finding]:
     """Yield where what it holds is not what the file has, no more and no less."""
     for part in MissionType:
-        rule, rows = f"holds-{part.name.lower()}", held.rows(part, seen.vehicle)
+        rule, rows = f"holds-{part.name.lower()}", held.lists.get(part, ())
         wanted = wire_items(flight.mission, part, seen.vehicle)
         if part in held.missing:
             yield _found("holds-unread", rule=rule, title=part.title)
@@ -253,12 +254,11 @@ def _lists(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterato
             for wrong in held.other_than(wanted, part, seen.vehicle)[:1]:
                 yield _found("holds-another", rule=rule, wrong=wrong)
         elif rows:
-            fence = part is MissionType.FENCE
-            level, idle = None, ""
-            if fence and own.type.at_fence(own).action == "nothing":
-                level, idle = Level.WARNING, ", and does nothing about it"
-            title, items = "a fence" if fence else part.title, counted(len(rows), "item")
-            yield _found("holds-more", level, rule, title=title, items=items, idle=idle)
+            fence, items = part is MissionType.FENCE, counted(len(rows), "item")
+            idle = fence and own.type.at_fence(own).action == "nothing"
+            says = {"title": "a fence" if fence else part.title, "items": items}
+            says["idle"] = ", and does nothing about it" if idle else ""
+            yield _found("holds-more", Level.WARNING if idle else None, rule, **says)
 
 
 def _timing(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
@@ -274,28 +274,14 @@ def _timing(flight: Flight, held: Held, seen: Telemetry) -> Iterator[Finding]:
             wanted = number_in(parameter, name, given)
             if wanted is not None and not math.isclose(values[name], wanted, rel_tol=1e-6):
                 other.append(f"{name} is {values[name]:g}, not {wanted:g}")
-    # Setpoints come when they are due, whatever the mission's time is.
-    level = Level.WARNING if flight.streamed else None
-    rows = ("timing-other", level, other), ("timing-unread", level, unread)
-    for row, its_level, names in (*rows, ("parameters-unread", None, assumed)):
+    rows = {"timing-other": other, "timing-unread": unread, "parameters-unread": assumed}
+    for row, names in rows.items():
+        # Setpoints come when they are due, whatever the mission's time is.
+        level = Level.WARNING if flight.streamed and row.startswith("timing") else None
         if names:
-            yield _found(row, its_level, names=", ".join(names))
+            yield _found(row, level, names=", ".join(names))
     if not given:
         yield _found("timing-unknown")
-
-
-def _battery(seen: Telemetry, judged: Check) -> Iterator[Finding]:
-    energy, percent = judged.energy, seen.battery
-    if percent is None:
-        yield _found("battery-unknown")
-        return
-    least, why = float(LEAST_BATTERY), "where no plan tells what the flight takes"
-    if energy is not None and energy.battery is not None:
-        takes = 100 * energy.total / energy.battery.capacity_wh
-        least = takes + energy.battery.reserve
-        why = f"the flight takes {takes:.0f} %, and is to leave {energy.battery.reserve:g} %"
-    if percent < least:
-        yield _found("battery-low", percent=percent, least=least, why=why)
 
 
 def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Iterator[Finding]:
@@ -318,7 +304,7 @@ def _by_itself(flight: Flight, held: Held, seen: Telemetry, own: Vehicle) -> Ite
         does, instead = refusal or (f"setpoints lost: {rules.without(values)}", "")
         level = Level.ERROR if refusal else Level.NOTE
         yield _found("on-setpoints-lost", level, does=does, instead=instead)
-    if held.rows(MissionType.FENCE, seen.vehicle):
+    if held.lists.get(MissionType.FENCE):
         response = own.type.at_fence(own)
         does, name = _AT_FENCE[response.action], own.name_of(response.parameter)
         instead = "" if response.keeps else f"set {name} {response.set_to}"

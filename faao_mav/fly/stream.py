@@ -1,14 +1,15 @@
 """Flying a plan by setpoints: the trajectory itself, not way points along it."""
 
 import math
+from collections import deque
+from statistics import median
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.fly.itinerary import LEVEL, Itinerary
+from faao_mav.fly.itinerary import LEVEL, Itinerary, Setpoint, at_rest
 from faao_mav.fly.preflight import Clearance
-from faao_mav.fly.setpoints import OwnClock, OwnFrame, Setpoint, at_rest
 from faao_mav.fly.telemetry import PATIENCE
 from faao_mav.fly.watch import Order, Watch
 from faao_mav.wire import messages
@@ -33,6 +34,65 @@ _STREAMED = 1.5
 Chosen."""
 
 _FAILSAFE = "it is in its failsafe, until setpoints come again"
+
+_LOCAL_NED, _NO_YAW = 1, 1 << 10 | 1 << 11
+"""MAV_FRAME_LOCAL_NED; and of POSITION_TARGET_TYPEMASK: yaw and yaw rate are ignored, all else
+counts."""
+
+
+_KEPT, _LONGEST_TRIP, _ANOTHER_CLOCK = 9, 1.0, 60.0
+"""How many round trips on the link are kept, one each half second, whose median counts; the most
+that counts, s; and from how many seconds of the world on a time is one of another clock than the
+answers'. Chosen."""
+
+
+class OwnClock:
+    """What the answers to TIMESYNC tell; before the second one a round trip takes no time.
+
+    Only those to own questions count: vehicles tell everybody what they answer to anybody.
+    """
+
+    def __init__(self) -> None:
+        self._asked = deque[int](maxlen=_KEPT)
+        self._trips = deque[float](maxlen=_KEPT)
+        self._read = deque[tuple[float, float]](maxlen=_KEPT)
+        """When we were in the middle of a short trip, and what the vehicle's clock read, s."""
+
+    def ask(self, now: float) -> messages.Timesync:
+        """Return the question, with the time `now` in it, which the answer repeats."""
+        self._asked.append(int(now * 1e9))
+        return messages.Timesync(0, self._asked[-1])
+
+    def hear(self, answer: messages.Timesync, now: float) -> None:
+        """Take note of an answer."""
+        asked = answer.ts1 / 1e9
+        if answer.tc1 and answer.ts1 in self._asked:
+            self._trips.append(now - asked)
+            if now - asked <= _LONGEST_TRIP:
+                self._read.append(((asked + now) / 2, answer.tc1 / 1e9))
+
+    @property
+    def speed(self) -> float:
+        """How many seconds of the vehicle's clock a second of the world's has."""
+        if len(self._read) < 2:
+            return 1.0
+        (begin, first), (end, last) = self._read[0], self._read[-1]
+        return max((last - first) / max(end - begin, 1e-9), 1e-3)
+
+    @property
+    def lead(self) -> float:
+        """How long a round trip takes, s of the vehicle's clock."""
+        if len(self._trips) < 2:
+            return 0.0
+        return min(self.speed * median(self._trips), _LONGEST_TRIP)
+
+    def age(self, t: float, now: float) -> float:
+        """Return how long ago, s of the world, the vehicle's clock read `t`, s; 0: not known."""
+        if len(self._read) < 2:
+            return 0.0
+        middle, there = self._read[-1]
+        age = now - middle + (there - t) / self.speed
+        return age if 0 < age < _ANOTHER_CLOCK else 0.0
 
 
 class Stream(Watch):
@@ -70,7 +130,11 @@ class Stream(Watch):
         self._ahead = 0.0 if self._rules.carries_on else self._period / 2
         tell = self.seen.told.append
         self.flight = Itinerary(solution, tell, takes_off=not self._by_setpoints)
-        self._clock, self._frame = OwnClock(), OwnFrame(self._family, plan.origin)
+        self._clock, self._plans = OwnClock(), plan.origin.frame
+        self._origin: messages.GpsGlobalOrigin | None = None
+        """Where its own frame has its origin, None until it tells."""
+        self._home: int | None = None
+        """How high above the sea, mm, home was at the departure: it may be set anew in flight."""
         self._home_told = False
         self._unsure_since: float | None = None
         """Since when it is not known who flies it: then nothing that moves it is sent."""
@@ -80,12 +144,15 @@ class Stream(Watch):
 
     def _hear(self, message: Message, now: float) -> None:
         in_flight = self.phase in ("flying", "ending", "holding")
-        if in_flight and self.seen.silence > self._without_setpoints:
+        # For so many of the world's seconds it keeps its mode without setpoints.
+        name, values = self._rules.timeout, self.gate.held.reading.values
+        kept = values.get(name, self._rules.defaults[name]) / max(self._clock.speed, 1.0)
+        if in_flight and self.seen.silence > kept:
             self._unsure_since, self.seen.wanted = now, None  # it may be in another mode since
         super()._hear(message, now)
         match message:
             case messages.GpsGlobalOrigin():
-                self._frame.origin = message
+                self._origin = message
             case messages.Timesync():
                 self._clock.hear(message, now)
             case messages.CurrentMode(custom_mode=mode) if in_flight:
@@ -100,13 +167,13 @@ class Stream(Watch):
         if self.phase == "flying" and now >= self._sent_by:
             self._give_up("for too long no setpoint could be sent", now)
             return
-        if self.phase == "checking" and self._frame.origin is None:
+        if self.phase == "checking" and self._origin is None:
             ask = (MavCommand.REQUEST_MESSAGE, 0, float(LOCAL_ORIGIN))
             self._out.append(messages.CommandLong(self._peer.address, *ask))
         self._out.append(self._clock.ask(now))
 
     def _lacks(self, now: float) -> str:
-        if self._frame.origin is None or not self.seen.fixes:
+        if self._origin is None or not self.seen.fixes:
             return super()._lacks(now) or "it does not tell where its own frame begins"
         age = self._clock.age(self.seen.fixes[-1].t, now)
         late = f"its positions come {age:.0f} s late, by the clock of its TIMESYNC"
@@ -118,7 +185,7 @@ class Stream(Watch):
         super()._begin()
         position = self.seen.position
         assert position is not None
-        self._frame.home = position.alt - position.relative_alt
+        self._home = position.alt - position.relative_alt
         climb = 0.0 if self._by_setpoints else self._height / _SLOW_CLIMB
         self._sent_by = self.seen.heard_at + PATIENCE + climb
 
@@ -170,7 +237,10 @@ class Stream(Watch):
     # ---- where it is to be
 
     def _on_position(self, position: messages.GlobalPositionInt, now: float) -> None:
-        t, place = position.time_boot_ms / 1000, self._frame.place(position)
+        home_now = position.alt - position.relative_alt
+        home = home_now if self._home is None else self._home
+        t, level = position.time_boot_ms / 1000, (position.lat / 1e7, position.lon / 1e7)
+        place = np.append(self._plans.to_local(*level), (position.alt - home) / 1000)
         velocity = np.array([position.vy, position.vx, -position.vz]) / 100
         if self.outcome is not None or self._clock.age(t, now) > _OLD:
             return
@@ -178,14 +248,14 @@ class Stream(Watch):
             self._begin()
         under_way, gate = self.phase in ("flying", "ending"), self.flight.gate
         if under_way and not gate.believes(t, place, velocity):
-            if gate.has_lost_it(t):
+            if gate.has_lost_it:
                 self._give_up("where it is, is not known", now)
             return
         setpoint = self._setpoint(t, place, velocity)
         if under_way and self.flight.trouble is not None:
             self._give_up(self.flight.trouble, now)
             return
-        risen = self._frame.risen(position)
+        risen = (home_now - home) / 1000
         if abs(risen) > LEVEL and not self._home_told:
             self._home_told = True
             what = f"home is {risen:+.0f} m higher now"
@@ -200,14 +270,19 @@ class Stream(Watch):
         if setpoint is not None and t >= self._last_sent + _EARLY * self._period:
             self._last_sent, self._sent_by = t, now + PATIENCE
             self._first_sent = min(self._first_sent, t)
-            self._out.append(self._frame.message(setpoint, position, self._peer.address))
+            self._out.append(self._told(setpoint, position.time_boot_ms, home))
 
-    @property
-    def _without_setpoints(self) -> float:
-        """For how many of the world's seconds it keeps its mode without setpoints."""
-        name, values = self._rules.timeout, self.gate.held.reading.values
-        kept = values.get(name, self._rules.defaults[name])
-        return kept / max(self._clock.speed, 1.0)
+    def _told(self, setpoint: Setpoint, time: int, home: int) -> Message:
+        """Return `setpoint` in the vehicle's frame, at `time`, ms; `home` is mm above the sea."""
+        assert self._origin is not None
+        own = self._family.local_frame(self._origin.latitude / 1e7, self._origin.longitude / 1e7)
+        p, v, a = setpoint
+        east, north = own.to_local(*self._plans.to_geodetic(p[:2]))
+        up = p[2] + (home - self._origin.altitude) / 1000
+        values = (north, east, -up, v[1], v[0], -v[2], a[1], a[0], -a[2])
+        return messages.SetPositionTargetLocalNed(
+            self._peer.address, time, _LOCAL_NED, _NO_YAW, *map(float, values)
+        )
 
     def _setpoint(self, t: float, place: Real, velocity: Real) -> Setpoint | None:
         """Return where the aircraft is to be at `t`; None while nothing is to be sent."""

@@ -1,24 +1,18 @@
-"""What is held and seen of a vehicle: its lists and parameters, and what it tells of its flight."""
+"""What is seen of a vehicle: what it tells of its flight."""
 
 import math
-from collections.abc import Mapping, Sequence, Set
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence, Set
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-from faao_mav.autopilot import VehicleType
-from faao_mav.errors import InputError
 from faao_mav.mission.item import Home
 from faao_mav.validate.flown import Fix, FlightRecord
 from faao_mav.wire import messages, protocol
-from faao_mav.wire.jobs import download_lists
-from faao_mav.wire.machine import Talk, ask_for
 from faao_mav.wire.messages import Envelope, Message, WireItem
-from faao_mav.wire.parameters import Reading, read_parameters
 from faao_mav.wire.protocol import MavCommand, MissionType
-from faao_mav.wire.transfer import PartReport, Peer
-from faao_mav.wire.whereabouts import home_in, place_in
-from faao_mav.wire.wire_items import Difference, compare, home_items
+from faao_mav.wire.transfer import Peer
+from faao_mav.wire.whereabouts import place_in
+from faao_mav.wire.wire_items import compare, home_items
 
 Kind: TypeAlias = Literal[
     "finished", "taken over", "held", "left", "refused", "contested", "changed", "rebooted", "lost"
@@ -28,9 +22,7 @@ PATIENCE = 60.0
 """Seconds after which nothing that has not come is waited for any more: a message, checks that
 pass, a setpoint that may be sent. Chosen."""
 
-_SILENT = 5.0
-"""Seconds without any message after which the link counts as interrupted: five heartbeats."""
-
+_SILENT = 5.0  # Seconds without a message, five heartbeats, in which the link counts as broken.
 POSITION_RATE = 5.0
 """Positions a second that are asked for. Chosen: at 8 m/s they are 1.6 m apart."""
 
@@ -46,58 +38,7 @@ _PROPULSION = (0, 1, 2)
 """MAV_BATTERY_FUNCTION of batteries that keep the aircraft in the air: unknown, all, propulsion."""
 
 _WARNING = protocol.MavSeverity.WARNING
-
-_BACK = 2000
-"""Milliseconds by which a vehicle's clock goes back when it has rebooted; less is a late packet."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Held:
-    """What a vehicle holds: `lists` as downloaded, its home row included, `reading` of parameters.
-
-    `missing` says why a list is not there; `home` is where it returns to, None where that is not
-    known.
-    """
-
-    lists: Mapping[MissionType, tuple[WireItem, ...]]
-    reading: Reading
-    missing: Mapping[MissionType, PartReport] = field(default_factory=dict)
-    home: Home | None = None
-
-    def rows(self, part: MissionType, vehicle: VehicleType) -> tuple[WireItem, ...]:
-        """Return the items of one list, without the home row; none where it was not read."""
-        return tuple(self.lists.get(part, ()))[home_items(vehicle, part) :]
-
-    def other_than(
-        self, sent: Sequence[WireItem], part: MissionType, vehicle: VehicleType
-    ) -> tuple[Difference, ...]:
-        """Return where one list is not `sent`, home included, but for what storage loses."""
-        found = compare(sent, self.lists.get(part, ()), part, vehicle)
-        return tuple(each for each in found if each.kind == "wrong")
-
-
-def read_held(
-    peer: Peer, parts: Sequence[MissionType] = tuple(MissionType), *, parameters: bool = True
-) -> Talk[Held]:
-    """Read what the vehicle of `peer`, which has to be one that is known, holds.
-
-    That are the lists `parts`, and with `parameters` these and its home.
-    """
-    vehicle = peer.vehicle
-    assert vehicle is not None
-    lists, missing = yield from download_lists(parts, peer)
-    if MissionType.MISSION in missing or not parameters:
-        return Held(lists, Reading({}), missing)
-    names = [tuple(each.names) for each in vehicle.parameters.values()]
-    names += [(name,) for each in vehicle.failsafes for name in each.defaults]
-    if vehicle.modes.guided is not None:
-        names += [(name,) for name in vehicle.family.setpoints.defaults]
-    reading = yield from read_parameters(peer, names)
-    told = yield from ask_for(peer.address, protocol.HOME_POSITION, messages.HomePosition)
-    home = None
-    with suppress(InputError):
-        home = None if told is None else home_in(told)
-    return Held(lists, reading, missing, home)
+_BACK = 2000  # Milliseconds by which a clock goes back at a boot; less is a late packet. Chosen.
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,16 +7,10 @@ from typing import Literal, TypeAlias
 
 from faao_mav.fly.preflight import Clearance
 from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
-from faao_mav.wire import messages
+from faao_mav.wire import messages, protocol
 from faao_mav.wire.machine import Machine
 from faao_mav.wire.messages import CommandLong, Envelope, Message
-from faao_mav.wire.protocol import (
-    LOCAL_POSITION,
-    MISSION_COMPLETE,
-    MavCommand,
-    MissionType,
-    command_result,
-)
+from faao_mav.wire.protocol import MavCommand, MissionType
 
 Phase: TypeAlias = Literal[
     "checking", "engaging", "arming", "starting", "disarming", "waiting", "flying", "holding",
@@ -27,8 +21,7 @@ _AGAIN, _TRIES = 1.5, 5
 """Seconds after which an order that is not carried out is repeated, and how often: as the MAVLink
 guide has it for missions."""
 
-_ACCEPTED, _IN_PROGRESS = 0, 5
-"""MAV_RESULT."""
+_ACCEPTED, _IN_PROGRESS = 0, 5  # MAV_RESULT.
 
 _TICK, _REBOOT = 0.5, 1.5
 """Seconds between two looks at what is due, and in which a vehicle that is not armed any more can
@@ -38,8 +31,7 @@ _LATE_NEWS = 3.0
 """Seconds after a change of mode in which the last item may still be told to be under way: then it
 was the mission that changed it. Chosen: three of the messages that tell the item."""
 
-_FIRST_DO = 176
-"""From this command on an item is no place to fly to or to wait at."""
+_FIRST_DO = 176  # From this command on an item is no place to fly to or to wait at.
 
 _LISTEN, _WORDS = 2.0, 1.0
 """Seconds of listening for other ground stations before anything is started: two heartbeats; and
@@ -68,8 +60,9 @@ class Watch(Machine[Ending]):
     """A machine that watches a vehicle fly the mission that it holds to its end.
 
     `gate` says which vehicle, and what stands against the flight until it begins. `lands`: it ends
-    on the ground. After `PATIENCE` seconds without a message it ends. `seen` is what it has heard;
-    it asks for `rate` positions a second.
+    on the ground. `streams`: no mission is flown, but a plan by setpoints. `seen` is what it has
+    heard; it asks for `rate` positions a second. `relay_start` is when the plan's clock read 0, s
+    on the vehicle's, where that is known. After `PATIENCE` seconds without a message it ends.
 
     With `arm` it arms the vehicle and starts the mission: once the autopilot's own checks pass, it
     knows where it is, no other ground station was heard, what it holds has been read again and the
@@ -90,7 +83,6 @@ class Watch(Machine[Ending]):
     """
 
     streams = False
-    """Whether it is not the mission that is flown, but a plan by setpoints."""
 
     def __init__(
         self, gate: Clearance, *, arm: bool = False, lands: bool = True, rate: float = POSITION_RATE
@@ -103,25 +95,21 @@ class Watch(Machine[Ending]):
         self.seen = Telemetry(self._peer, rows, rate)
         self._modes, self._family = self.seen.vehicle.modes, self.seen.vehicle.family
         if arm:
-            self.seen.ask_for(LOCAL_POSITION, 1.0)
+            self.seen.ask_for(protocol.LOCAL_POSITION, 1.0)
         self.phase: Phase = "checking" if arm else "waiting"
         self.relay_start: float | None = None
-        """When the plan's clock read 0, s on the vehicle's, where that is known."""
-        self._flown = self._modes.mission
-        """The mode that flies it."""
-        self._left: list[tuple[Phase, Order]] = [
-            ("arming", Order(MavCommand.ARM, (1.0,))),
-            ("starting", Order(MavCommand.START)),
-        ]
-        """The orders that are left to start it, one after the other."""
+        self._flown = self._modes.mission  # the mode that flies it
+        # The orders that are left to start it, one after the other.
+        start: tuple[Phase, Order] = ("starting", Order(MavCommand.START))
+        self._left: list[tuple[Phase, Order]] = [("arming", Order(MavCommand.ARM, (1.0,))), start]
         self._order: Order | None = None
+        # The modes of this phase, in the order in which they come; none: any.
         self._path: tuple[int, ...] = ()
-        """The modes of this phase, in the order in which they come; none: any."""
         self._furthest, self._unattended, self._aside_since = 0, False, -math.inf
         self._then = Ending("refused", "")
+        # What is said once the present call returns; not said any more when an interrupt cuts that
+        # short, as it may anywhere: no order is to follow it.
         self._out: list[Message] = []
-        """What is said once the present call returns; not said any more when an interrupt cuts that
-        short, as it may anywhere: no order is to follow it."""
 
     def start(self, now: float) -> Sequence[Message]:
         """Listen, and ask for telemetry."""
@@ -220,7 +208,7 @@ class Watch(Machine[Ending]):
             self.seen.told.append("it is the mission that changed the mode, at its last item")
             self._furthest = current.seq
             self._over()
-        if current.mission_state == MISSION_COMPLETE and self.phase == "flying":
+        if current.mission_state == protocol.MISSION_COMPLETE and self.phase == "flying":
             self._over()
 
     def _on_mode(self, mode: int, now: float) -> None:
@@ -249,7 +237,7 @@ class Watch(Machine[Ending]):
         Arming that is denied is not asked for again, but for setpoints, whose mode may need what
         the checks did not ask for before: what is said about it is waited for.
         """
-        order.answer = f"answers {order.command.name} with {command_result(result)}"
+        order.answer = f"answers {order.command.name} with {protocol.command_result(result)}"
         accepted = result == _ACCEPTED
         order.refusals += not accepted
         match self.phase:
@@ -399,8 +387,8 @@ class Watch(Machine[Ending]):
 
     def _leave_armed(self, why: str) -> None:
         """End, though it may still be armed."""
-        text = f"{self._then.text}; it may still be armed: {why}{self._words}"
-        self._end(self._then.kind, text)
+        then = self._then
+        self._end(then.kind, f"{then.text}; it may still be armed: {why}{self._words}")
 
     def _end_as_heard(self, now: float) -> None:
         """End where what was heard says so; what may be armed is disarmed whatever that is."""

@@ -12,42 +12,24 @@ from faao_mav.autopilot.files import MadeFor, addressee_mistake
 from faao_mav.errors import InputError, LinkError
 from faao_mav.mission.item import Mission
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.jobs import (
-    Lists,
-    UploadReport,
-    download_lists,
-    explain,
-    upload_parts,
-    what_is_left,
-)
+from faao_mav.wire.jobs import UploadReport, explain, read_held, upload_parts, what_is_left
 from faao_mav.wire.link import Observe, WireLink
 from faao_mav.wire.machine import Talk, ask_alive, ask_for
-from faao_mav.wire.messages import GlobalPositionInt, HomePosition
+from faao_mav.wire.messages import GlobalPositionInt
 from faao_mav.wire.parameters import check_settable, set_parameters
-from faao_mav.wire.protocol import (
-    GROUND_STATION,
-    HOME_POSITION,
-    POSITION,
-    Address,
-    MissionType,
-    meaning,
-)
+from faao_mav.wire.protocol import GROUND_STATION, POSITION, Address, MissionType, meaning
 from faao_mav.wire.signing import Verdict, read_signing, remember
 from faao_mav.wire.transfer import PartReport, Peer
 from faao_mav.wire.transport import parse_connection
-from faao_mav.wire.whereabouts import Whereabouts, home_in, place_in
-from faao_mav.wire.wire_items import home_items, mission_of, wire_items
+from faao_mav.wire.whereabouts import Whereabouts, place_in
+from faao_mav.wire.wire_items import mission_of, wire_items
 
 _PASSED_OVER: dict[Verdict, str] = {
     "forged": "packets come that are signed with another key than the one in {key}",
-    "old": (
-        "packets come that are signed with this key, but not later than those before: of a "
-        "recording, or of a vehicle whose clock is behind and that does not hear this station"
-    ),
-    "unsigned": (
-        "packets come that are not signed: set the vehicle up to sign them with this key, or leave "
-        "out --signing-key"
-    ),
+    "old": """packets come that are signed with this key, but not later than those before: of a \
+recording, or of a vehicle whose clock is behind and that does not hear this station""",
+    "unsigned": """packets come that are not signed: set the vehicle up to sign them with this \
+key, or leave out --signing-key""",
 }
 """Why no vehicle is heard where packets come that have to be signed."""
 
@@ -108,10 +90,8 @@ def upload(
     with Session(connection, **options) as session:
         found, peer = session.found, session.peer
         if found.armed and not allow_armed:
-            raise LinkError(
-                f"{connection}: {found}: the mission of an armed vehicle is not replaced; "
-                "disarm it, or allow it (--allow-armed)"
-            )
+            told = "the mission of an armed vehicle is not replaced; disarm it, or allow it"
+            raise LinkError(f"{connection}: {found}: {told} (--allow-armed)")
         if made_for is not None and peer.vehicle is not None:
             mistake = addressee_mistake(made_for, peer.vehicle)
             if mistake is not None:
@@ -125,11 +105,10 @@ def upload(
             changes, problem = yield from set_parameters(parameters or {}, peer)
             reports = () if problem else (yield from upload_parts(parts, peer))
             problems = [problem] if problem else []
-            for each in reports:
-                if not each.verified:
-                    unheard = each.verdict == "silent" and each.item is None
-                    why = session.why_silent() if unheard else ""
-                    problems.append(explain(each, peer, mission) + why)
+            for each in (each for each in reports if not each.verified):
+                unheard = each.verdict == "silent" and each.item is None
+                why = session.why_silent() if unheard else ""
+                problems.append(explain(each, peer, mission) + why)
             place = None if told is None else place_in(told)
             stands = None if place is None else Whereabouts.of(place, mission)
             seconds = time.monotonic() - session.started
@@ -177,28 +156,17 @@ def holdings(connection: str, **options: Unpack[LinkOptions]) -> Holdings:
     that has no fence or rally points at all is one that has none stored.
     """
     with Session(connection, **options) as session:
-        peer = session.peer
-
-        def read() -> Talk[tuple[Lists, HomePosition | None]]:
-            lists, told = (yield from download_lists(tuple(MissionType), peer)), None
-            flown = lists[0].get(MissionType.MISSION)
-            if flown is not None and not flown[: home_items(peer.vehicle, MissionType.MISSION)]:
-                told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
-            return lists, told
-
-        (lists, unread), told = session.run(read())
-        missing = {part: session.not_read(report) for part, report in unread.items()}
+        held = session.run(read_held(session.peer, parameters=False))
+        missing = {part: session.not_read(report) for part, report in held.missing.items()}
         if MissionType.MISSION in missing:
             raise LinkError(f"{connection}: {missing[MissionType.MISSION]}")
         try:
-            mission = mission_of(lists, peer.vehicle)
-            if told is not None:
-                mission = replace(mission, home=home_in(told))
+            mission = mission_of(held.lists, session.peer.vehicle)
         except InputError as error:
-            raise LinkError(
-                f"{connection}: what the vehicle holds is no mission: {error}"
-            ) from None
-    mission = replace(mission, unread=tuple(part.title for part in missing))
+            told = f"what the vehicle holds is no mission: {error}"
+            raise LinkError(f"{connection}: {told}") from None
+    unread = tuple(part.title for part in missing)
+    mission = replace(mission, home=held.home or mission.home, unread=unread)
     return Holdings(session.found, mission, tuple(missing.values()))
 
 
@@ -221,7 +189,11 @@ class Session(WireLink):
         try:
             self.found = self._found(connection, options)
             self.bind(self.found.address, *self.found.origins)
-            self._check_alive(connection)
+            alive = ask_alive(self.found.address, secrets.randbits(62))
+            if self._signing is not None and not self.run(alive):  # a recording of such a session
+                told = "no answer to a question that was never asked before (TIMESYNC)"
+                where = "is the vehicle there, or a recording of it?"
+                raise LinkError(f"{connection}: {self.found}: {told}: {where}")
         except BaseException:
             self.close()
             raise
@@ -242,18 +214,8 @@ class Session(WireLink):
         heard = self.run(discover(*which, patience=wait, listens=self.listens, knocks=knocks))
         for verdict, text in _PASSED_OVER.items():
             if self._signing and not heard.vehicles and verdict in self.codec.heard:
-                told = text.format(key=self._key_file)
-                raise LinkError(f"{connection}: no vehicle: {told}")
+                raise LinkError(f"{connection}: no vehicle: {text.format(key=self._key_file)}")
         return choose(heard, connection, *which, wait)
-
-    def _check_alive(self, connection: str) -> None:
-        """Raise `LinkError` for a recording of a signed session."""
-        if self._signing is None or self.run(ask_alive(self.found.address, secrets.randbits(62))):
-            return
-        raise LinkError(
-            f"{connection}: {self.found}: no answer to a question that was never asked before "
-            "(TIMESYNC): is the vehicle there, or a recording of it?"
-        )
 
     def not_read(self, report: PartReport) -> str:
         """Return in words why a list was not read."""

@@ -18,9 +18,7 @@ _MAVLINK_1, _MAVLINK_2, _SIGNATURE = 0xFE, 0xFD, 13
 _AROUND = {_MAVLINK_1: 8, _MAVLINK_2: 12}
 """Bytes of a packet's header and checksum, by its first byte."""
 
-_SIGNED = 0x01
-"""The flag, in the third byte of a MAVLink 2 packet, that it has a signature. There are no others
-yet, and a packet with one is not to be read."""
+_SIGNED = 0x01  # The flag, in a MAVLink 2 packet's third byte, for a signature: the only one yet.
 
 _KINDS: dict[str, type[Message]] = {
     re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__).upper(): kind
@@ -57,6 +55,7 @@ class Framer:
             end = place + _length_of(stream[place : place + 3])
             if end > len(stream):
                 break
+            # A packet with a flag that is not known is not to be read.
             if stream[place] == _MAVLINK_1 or stream[place + 2] <= _SIGNED:
                 packets.append(stream[place:end])
             place = end
@@ -86,9 +85,7 @@ def sender_of(packet: bytes) -> Address:
 
 def message_id(packet: bytes) -> int:
     """Return the number of the message in `packet`."""
-    if packet[0] == _MAVLINK_1:
-        return packet[5]
-    return int.from_bytes(packet[7:10], "little")
+    return packet[5] if packet[0] == _MAVLINK_1 else int.from_bytes(packet[7:10], "little")
 
 
 def _length_of(header: bytes) -> int:
@@ -186,21 +183,17 @@ def _envelope(packet: Any, raw: bytes, origin: str) -> Envelope | None:
     kind = _KINDS.get(packet.get_type())
     if kind is None:
         return None
-    values = {field.name: _on_one_line(getattr(packet, field.name, 0)) for field in fields(kind)}
+    values = {field.name: getattr(packet, field.name, 0) for field in fields(kind)}
+    for name, value in values.items():
+        if isinstance(value, str):  # without what moves a terminal's cursor
+            values[name] = "".join(c if c.isprintable() else " " for c in value)
     if "target" in values:
         values["target"] = Address(packet.target_system, packet.target_component)
     if "item" in values:
-        p = packet
-        params = (p.param1, p.param2, p.param3, p.param4)
-        flags = (p.current, p.autocontinue)
-        values["item"] = WireItem(p.command, p.frame, params, p.x, p.y, p.z, *flags)
+        params = packet.param1, packet.param2, packet.param3, packet.param4
+        place, flags = (packet.x, packet.y, packet.z), (packet.current, packet.autocontinue)
+        values["item"] = WireItem(packet.command, packet.frame, params, *place, *flags)
     if _BEYOND in values and raw[0] == _MAVLINK_2:
         payload = raw[10 : 10 + raw[1]]
         values[_BEYOND] = int.from_bytes(payload[packet.unpacker.size :][:4], "little")
     return Envelope(sender_of(raw), kind(**values), origin)
-
-
-def _on_one_line(value: Any) -> Any:
-    """Return a text without what moves a terminal's cursor, and anything else as it is."""
-    is_text = isinstance(value, str)
-    return "".join(c if c.isprintable() else " " for c in value) if is_text else value

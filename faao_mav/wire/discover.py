@@ -2,29 +2,15 @@
 
 from dataclasses import dataclass, replace
 
-from faao_mav.autopilot import (
-    AutopilotFamily,
-    VehicleType,
-    families,
-    kind_by_number,
-    kinds,
-    vehicle_type_by_numbers,
-)
+from faao_mav import autopilot
 from faao_mav.errors import LinkError
+from faao_mav.wire import protocol
 from faao_mav.wire.machine import AT_ONCE, Talk
 from faao_mav.wire.messages import Heartbeat, Timesync
-from faao_mav.wire.protocol import (
-    COMPANION_TYPE,
-    GROUND_STATION_TYPE,
-    NO_AUTOPILOT,
-    Address,
-    MavState,
-    listed,
-)
+from faao_mav.wire.protocol import Address, MavState, listed
 from faao_mav.wire.transport import Origin
 
 _MAIN = 1  # MAV_COMP_ID_AUTOPILOT1: by custom the autopilot's number in its system.
-
 _BOOT = 60.0  # Seconds that a vehicle may boot. Chosen.
 
 _SETTLE, _GREET, _KNOCK = 1.2, 1.0, 2.0
@@ -33,7 +19,7 @@ there; and of silence before a heartbeat is sent into it. Chosen: vehicles send 
 
 _NOTHING = "is it switched on and connected there, and no other program in between?"
 
-_KNOCKING = Heartbeat(COMPANION_TYPE, NO_AUTOPILOT, 0, 0, MavState.ACTIVE)
+_KNOCKING = Heartbeat(protocol.COMPANION_TYPE, protocol.NO_AUTOPILOT, 0, 0, MavState.ACTIVE)
 """A heartbeat that counts nowhere: not a ground station's, and of another system."""
 
 
@@ -47,8 +33,8 @@ class FoundVehicle:
     """
 
     address: Address
-    vehicle: VehicleType | None
-    family: AutopilotFamily | None
+    vehicle: autopilot.VehicleType | None
+    family: autopilot.AutopilotFamily | None
     kind: str
     armed: bool
     ready: bool
@@ -103,7 +89,7 @@ def discover(
         if line.heard is not None:
             knocks, sender, message = False, line.heard.sender, line.heard.message
             origins.setdefault(sender, {})[line.heard.origin] = None
-            if isinstance(message, Heartbeat) and message.type != GROUND_STATION_TYPE:
+            if isinstance(message, Heartbeat) and message.type != protocol.GROUND_STATION_TYPE:
                 vehicle = _found_vehicle(sender, message)
                 meant = system in (None, sender.system) and sender.component == (component or _MAIN)
                 if not message.of_autopilot:
@@ -140,17 +126,15 @@ def choose(
         problem = f"no heartbeat of {who} within {patience:g} s; {others}"
     elif twins := [each for each in found if len(each.origins) > 1]:
         origins = " and ".join(twins[0].origins[:2])
-        problem = (
-            f"{twins[0].address} is heard from {origins}: more than one vehicle has this number, "
-            "and which is meant is not known. Give each its own, or connect to one alone"
-        )
+        more = "more than one vehicle has this number, and which is meant is not known"
+        problem = f"{twins[0].address} is heard from {origins}: {more}. Give each its own, or "
+        problem += "connect to one alone"
     elif len(found) > 1:
-        names = listed(tuple(map(str, found)))
-        problem = f"several autopilots: {names}. Choose one with --system"
+        problem = f"several autopilots: {listed([*map(str, found)])}. Choose one with --system"
     elif not found[0].ready:
         problem = f"{found[0]} does not finish booting"
     elif found[0].family is not None and found[0].vehicle is None:
-        known = f"{' and '.join(kinds())} are (VTOLs are neither)"
+        known = f"{' and '.join(autopilot.kinds())} are (VTOLs are neither)"
         problem = f"{found[0]}: this type of vehicle is not supported; {known}"
     else:
         return found[0]
@@ -158,9 +142,10 @@ def choose(
 
 
 def _found_vehicle(sender: Address, heartbeat: Heartbeat) -> FoundVehicle:
-    vehicle = vehicle_type_by_numbers(heartbeat.autopilot, heartbeat.type)
-    family = next((f for f in families().values() if f.mav_autopilot == heartbeat.autopilot), None)
-    kind = kind_by_number(heartbeat.type) or f"vehicle of MAV_TYPE {heartbeat.type}"
+    vehicle = autopilot.vehicle_type_by_numbers(heartbeat.autopilot, heartbeat.type)
+    families = autopilot.families().values()
+    family = next((each for each in families if each.mav_autopilot == heartbeat.autopilot), None)
+    kind = autopilot.kind_by_number(heartbeat.type) or f"vehicle of MAV_TYPE {heartbeat.type}"
     # MAV_STATE_UNINIT is what simple vehicles say that do not tell their state.
     ready = heartbeat.system_status not in (MavState.BOOT, MavState.CALIBRATING)
     return FoundVehicle(sender, vehicle, family, kind, heartbeat.armed, ready)

@@ -1,33 +1,24 @@
-"""Whole jobs on a vehicle, as talks: upload, clear and verify, download everything; in words."""
+"""Whole jobs on a vehicle, as talks: upload, clear and verify, read what it holds; in words."""
 
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 
-from faao_mav.errors import counted
-from faao_mav.mission.item import Mission
+from faao_mav.autopilot import VehicleType
+from faao_mav.errors import InputError, counted
+from faao_mav.mission.item import Home, Mission
+from faao_mav.wire import transfer
 from faao_mav.wire.discover import FoundVehicle
-from faao_mav.wire.machine import Talk
-from faao_mav.wire.messages import WireItem
-from faao_mav.wire.parameters import Change
-from faao_mav.wire.protocol import MavResult, MissionType, listed, meaning
-from faao_mav.wire.transfer import (
-    ATTEMPTS,
-    TENTATIVE,
-    PartReport,
-    Peer,
-    read_list,
-    send_list,
-)
-from faao_mav.wire.whereabouts import Whereabouts
-from faao_mav.wire.wire_items import compare, home_items
+from faao_mav.wire.machine import Talk, ask_for
+from faao_mav.wire.messages import HomePosition, WireItem
+from faao_mav.wire.parameters import Change, Reading, read_parameters
+from faao_mav.wire.protocol import HOME_POSITION, MavResult, MissionType, listed, meaning
+from faao_mav.wire.transfer import PartReport, Peer
+from faao_mav.wire.whereabouts import Whereabouts, home_in
+from faao_mav.wire.wire_items import Difference, compare, home_items
 
 _ABSENT = frozenset({MavResult.UNSUPPORTED, MavResult.INVALID})
 """What a vehicle answers that has no such list at all."""
-
-_NOT_NOW = MavResult.DENIED, None
-"""The result, and the item, of an upload whose every announcement is denied."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,27 +53,19 @@ class UploadReport:
                 again = "" if part.attempts == 1 else f", in {part.attempts} attempts"
                 stored = f"{counted(part.items, 'item')} stored{again}"
                 lines.append(f"{part.part.title.split()[0]:<13}{stored}")
-        lines += [f"not kept     {text}" for part in self.parts for text in _dropped(part)]
+        for part in self.parts:  # one line for each field that storage loses
+            lost = dict[str, list[Difference]]()
+            for each in part.differences:
+                if each.kind == "dropped":
+                    lost.setdefault(each.field, []).append(each)
+            for first, *more in lost.values():
+                so = f" (and so in {len(more)} more items)" if more else ""
+                lines.append(f"not kept     {first}{so}")
         lines += [f"failed       {problem}" for problem in self.problems]
         if self.verified:
             took = f"the upload took {self.seconds:.1f} s"
             lines.append(f"verified     read back and compared; {took}")
         return "\n".join(lines)
-
-
-def _dropped(part: PartReport) -> list[str]:
-    """Return what storage lost, one line for each field."""
-    lost = [each for each in part.differences if each.kind == "dropped"]
-    fields = Counter(each.field for each in lost)
-    firsts = {each.field: each for each in reversed(lost)}
-    return [
-        str(firsts[field]) + (f" (and so in {count - 1} more items)" if count > 1 else "")
-        for field, count in fields.items()
-    ]
-
-
-Lists: TypeAlias = tuple[dict[MissionType, tuple[WireItem, ...]], dict[MissionType, PartReport]]
-"""The lists that were downloaded, and why others were not."""
 
 
 def upload_parts(
@@ -98,27 +81,25 @@ def upload_parts(
     """
     reports: list[PartReport] = []
     for part, items in parts:
-        report = yield from _upload_part(part, items, peer)
+        rows = len(items[home_items(peer.vehicle, part) :])
+        for attempt in range(1, transfer.ATTEMPTS + 1):
+            report = yield from transfer.send_list(items, peer, part)
+            if report.verdict in ("accepted", "unknown"):
+                read = yield from transfer.read_list(peer, part)
+                report = _read_back(report, items, read, peer)
+            report = replace(report, items=rows, attempts=attempt)
+            # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So
+            # may DENIED, but not if it is said of every announcement of a whole attempt.
+            denied = (report.result, report.item) == (MavResult.DENIED, None)
+            passes = report.result in transfer.TENTATIVE and not denied
+            final = report.verdict == "refused" and not passes
+            if final or report.verdict in ("verified", "armed"):
+                break
         if items or report.result not in _ABSENT:
             reports.append(report)
             if not report.verified:
                 break
     return tuple(reports)
-
-
-def _upload_part(part: MissionType, items: tuple[WireItem, ...], peer: Peer) -> Talk[PartReport]:
-    rows = len(items[home_items(peer.vehicle, part) :])
-    for attempt in range(1, ATTEMPTS + 1):
-        report = yield from send_list(items, peer, part)
-        if report.verdict in ("accepted", "unknown"):
-            report = _read_back(report, items, (yield from read_list(peer, part)), peer)
-        report = replace(report, items=rows, attempts=attempt)
-        # PX4 says ERROR when busy, and of packets that come late or twice: that may pass. So may
-        # DENIED, but not if it is said of every announcement of a whole attempt.
-        passes = report.result in TENTATIVE and (report.result, report.item) != _NOT_NOW
-        if report.verdict in ("verified", "armed") or (report.verdict == "refused" and not passes):
-            break
-    return report
 
 
 def _read_back(
@@ -127,27 +108,51 @@ def _read_back(
     """Return what became of `items` that were sent, by what was read of them."""
     said = sent.said or read.said
     if read.verdict != "accepted":
-        return replace(
-            sent, verdict="unread" if sent.verdict == "accepted" else "silent", said=said
-        )
+        verdict: transfer.Verdict = "unread" if sent.verdict == "accepted" else "silent"
+        return replace(sent, verdict=verdict, said=said)
     differences = compare(items, read.found, sent.part, peer.vehicle)
     told = replace(sent, differences=differences, said=said)
-    doubtful = sent.result in TENTATIVE
+    doubtful = sent.result in transfer.TENTATIVE
     if any(each.kind == "wrong" for each in differences):
         return replace(told, verdict="refused" if doubtful else "different")
     # A doubtful refusal is about a duplicate if the list is right, else about an item.
     return replace(told, verdict="verified", result=None if doubtful else sent.result)
 
 
-def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:
-    """Download the lists of `types`, each that comes.
+@dataclass(frozen=True, slots=True, eq=False)
+class Held:
+    """What the vehicle of a peer holds: `lists` as downloaded, its home row included.
+
+    `missing` says why a list is not there; `home` is where it returns to, None where that is not
+    known. `reading` is of its parameters.
+    """
+
+    lists: Mapping[MissionType, tuple[WireItem, ...]]
+    reading: Reading
+    missing: Mapping[MissionType, PartReport] = field(default_factory=dict)
+    home: Home | None = None
+
+    def other_than(
+        self, sent: Sequence[WireItem], part: MissionType, vehicle: VehicleType
+    ) -> tuple[Difference, ...]:
+        """Return where one list is not `sent`, home included, but for what storage loses."""
+        found = compare(sent, self.lists.get(part, ()), part, vehicle)
+        return tuple(each for each in found if each.kind == "wrong")
+
+
+def read_held(
+    peer: Peer, parts: Sequence[MissionType] = tuple(MissionType), *, parameters: bool = True
+) -> Talk[Held]:
+    """Read the lists `parts` of the vehicle of `peer`, each that comes.
 
     A vehicle that has no fence or rally points at all is one that has none stored. Where not even
-    the first list comes, and it is not refused, the others are not asked for.
+    the first list comes, and it is not refused, the others are not asked for. With `parameters`
+    those are read that missions, failsafes and streams depend on, and its home; without, that is
+    asked for where it is no row of the mission.
     """
     lists, missing = dict[MissionType, tuple[WireItem, ...]](), dict[MissionType, PartReport]()
-    for part in types:
-        report = yield from read_list(peer, part)
+    for part in parts:
+        report = yield from transfer.read_list(peer, part)
         absent = part is not MissionType.MISSION and report.result in _ABSENT
         if report.verdict == "accepted" or absent:
             lists[part] = report.found
@@ -155,7 +160,21 @@ def download_lists(types: Sequence[MissionType], peer: Peer) -> Talk[Lists]:
         missing[part] = report
         if report.verdict != "refused" and not lists:
             break
-    return lists, missing
+    held, vehicle = Held(lists, Reading({}), missing), peer.vehicle
+    if MissionType.MISSION not in lists:
+        return held
+    if parameters and vehicle is not None:
+        names = [tuple(each.names) for each in vehicle.parameters.values()]
+        names += [(name,) for each in vehicle.failsafes for name in each.defaults]
+        if vehicle.modes.guided is not None:
+            names += [(name,) for name in vehicle.family.setpoints.defaults]
+        held = replace(held, reading=(yield from read_parameters(peer, names)))
+    row = home_items(vehicle, MissionType.MISSION)
+    if parameters or not lists[MissionType.MISSION][:row]:
+        told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
+        with suppress(InputError):  # off the Earth
+            held = replace(held, home=None if told is None else home_in(told))
+    return held
 
 
 def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> str:

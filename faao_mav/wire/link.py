@@ -10,16 +10,11 @@ from typing import Any, Self, TypeAlias, TypeVar
 
 from faao_mav.errors import HangUp, LinkError
 from faao_mav.files import check_ending, check_writable
+from faao_mav.wire import protocol
 from faao_mav.wire.codec import Codec, Packet, message_id, sender_of
 from faao_mav.wire.machine import Machine, Script, Talk
 from faao_mav.wire.messages import Heartbeat, Message
-from faao_mav.wire.protocol import (
-    GROUND_STATION,
-    GROUND_STATION_TYPE,
-    NO_AUTOPILOT,
-    Address,
-    MavState,
-)
+from faao_mav.wire.protocol import Address
 from faao_mav.wire.signing import Signing
 from faao_mav.wire.transport import Origin, Transport, open_transport
 
@@ -92,7 +87,7 @@ class WireLink:
         *,
         signing: Signing | None = None,
         log: Path | None = None,
-        address: Address = GROUND_STATION,
+        address: Address = protocol.GROUND_STATION,
         note: Callable[[str], object] = lambda _: None,
         observe: Observe = lambda *_: None,
     ) -> None:
@@ -101,8 +96,8 @@ class WireLink:
         self.log = None if log is None else Tlog(log)
         self._vehicle: tuple[Address, Origin] | None = None
         # A number in it tells it from that of another program with this address, if it comes back.
-        token, state = secrets.randbits(32), MavState.ACTIVE
-        self._being_there = Heartbeat(GROUND_STATION_TYPE, NO_AUTOPILOT, 0, token, state)
+        of, token = (protocol.GROUND_STATION_TYPE, protocol.NO_AUTOPILOT), secrets.randbits(32)
+        self._being_there = Heartbeat(*of, 0, token, protocol.MavState.ACTIVE)
         self.strangers: set[Origin] = set()
         """Where packets in the name of the vehicle come from that is bound elsewhere."""
         self._transport = open_transport(connection) if isinstance(connection, str) else connection
@@ -208,10 +203,9 @@ class WireLink:
             return not isinstance(message, Heartbeat) or message.of_autopilot
         if origin not in self.strangers and len(self.strangers) < _SHOWN:
             self.strangers.add(origin)
-            self._note(
-                f"packets of {vehicle} come from {origin} too, not only from {own}: they do not "
-                "count. If the vehicle's address has changed, begin again"
-            )
+            told = f"packets of {vehicle} come from {origin} too, not only from {own}"
+            then = "they do not count. If the vehicle's address has changed, begin again"
+            self._note(f"{told}: {then}")
         return False
 
     def _send(self, messages: Sequence[Message], to: Origin | None = None) -> None:

@@ -18,9 +18,8 @@ SILENCE = 9.0
 """Seconds that a transfer may get no further: PX4 asks again for 5 s, ArduPilot for 8 s."""
 
 _QUICKEST, _FIRST, SLOWEST = 0.02, 0.25, 1.5
-"""Seconds after which a question is put again: at the earliest, as the main loop of the slowest
-vehicle (ArduPlane) turns 50 times a second; while it is not known how long answers take, and at the
-latest, by the guide."""
+"""Seconds after which a question is put again: at the earliest, as ArduPlane's main loop turns 50
+times a second; while it is not known how long answers take, and at the latest, by the guide."""
 
 _LONGEST = 0.5
 """Seconds after which it is put again at the latest on a quick link. Chosen: without it, of 50
@@ -47,9 +46,9 @@ class Machine(ABC, Generic[T]):
         """When `tick` is due."""
         return None if self.outcome is not None else self._due
 
-    @abstractmethod
     def start(self, now: float) -> Sequence[Message]:
         """Begin."""
+        return self._time_out(now)
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
         """Take note of what arrived."""
@@ -97,6 +96,7 @@ class Script(Machine[T]):
     def __init__(self, talk: "Talk[T]") -> None:
         super().__init__()
         self._talk = talk
+        next(talk)
         self._said: list[Message] = []
         self.now, self.progress = 0.0, ("starting", 0, 0)
         self.heard: Envelope | None = None
@@ -105,28 +105,20 @@ class Script(Machine[T]):
         """Send `messages` once the talk waits."""
         self._said += messages
 
-    def start(self, now: float) -> Sequence[Message]:
-        """Begin the talk."""
-        next(self._talk)
-        return self._carry_on(None, now)
-
-    def _receive(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        return self._carry_on(envelope, now)
-
-    def _time_out(self, now: float) -> Sequence[Message]:
-        return self._carry_on(None, now)
-
     def cancel(self, now: float) -> Sequence[Message]:  # noqa: ARG002
         """Close the talk: there is no outcome."""
         self._said, self._due = [], math.inf
         self._talk.close()
         return self._said
 
-    def _carry_on(self, heard: Envelope | None, now: float) -> Sequence[Message]:
+    def _time_out(self, now: float) -> Sequence[Message]:
+        return self._receive(None, now)
+
+    def _receive(self, envelope: Envelope | None, now: float) -> Sequence[Message]:
         self.now, self._said, self._due = now, [], AT_ONCE
         try:
             while self._due == AT_ONCE:
-                self.heard, heard = heard, None
+                self.heard, envelope = envelope, None
                 self._due = self._talk.send(self)
         except StopIteration as end:
             self.outcome = end.value
@@ -230,10 +222,7 @@ class Questions(Generic[K]):
 
 
 def ask(
-    what: str,
-    question: Message,
-    answer: Callable[[Envelope], T | None],
-    patience: float = 3.0,
+    what: str, question: Message, answer: Callable[[Envelope], T | None], patience: float = 3.0
 ) -> Talk[T | None]:
     """Put one question until it is answered, for `patience` seconds; return the answer, or None.
 

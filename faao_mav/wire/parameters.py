@@ -58,11 +58,7 @@ def carried(value: float, kind: int, vehicle: VehicleType | None) -> float:
 
 
 def same_value(one: float, other: float) -> bool:
-    """Tell whether two numbers are one in the single precision of the wire.
-
-    >>> same_value(0.1, 0.10000000149), same_value(0.1, 0.1001)
-    (True, False)
-    """
+    """Tell whether two numbers are one in the single precision of the wire."""
     return struct.pack("<f", one) == struct.pack("<f", other)
 
 
@@ -129,11 +125,9 @@ def number_in(parameter: Parameter, name: str, given: Mapping[str, float]) -> fl
     >>> number_in(speed, "WP_SPD", {"WPNAV_SPEED": 750.0})
     7.5
     """
-    if name in given:
-        return given[name]
-    other = parameter.name_in(given)
-    if other is None:
-        return None
+    other = name if name in given else parameter.name_in(given)
+    if other is None or other == name:
+        return given.get(name)
     return parameter.written(parameter.names[other] * given[other], name)
 
 
@@ -147,10 +141,9 @@ def check_settable(parameters: Iterable[str], source: object) -> None:
     own = {name for table in tables for each in table if each.motion for name in each.names}
     other = [name for name in parameters if name not in own]
     if other:
-        raise InputError(
-            f"{source}: {listed(other)}: not among what a mission is timed for, which alone is set "
-            "with it; set it with the ground station, and give the mission's own file"
-        )
+        told = "not among what a mission is timed for, which alone is set with it"
+        do = "set it with the ground station, and give the mission's own file"
+        raise InputError(f"{source}: {listed(other)}: {told}; {do}")
 
 
 def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[Change, ...], str]]:
@@ -178,11 +171,10 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
         if (number := number_in(parameter, name, wanted)) is not None
         if not same_value(number, before.values[name])
     }
-    setting = dict[str, ParamSet]()
+    setting, names = dict[str, ParamSet](), [(name,) for name in asked]
     for name, number in asked.items():
         kind = before.kinds[name]
         setting[name] = ParamSet(peer.address, name, carried(number, kind, peer.vehicle), kind)
-    names = [(name,) for name in asked]
     yield from read_parameters(peer, names, setting)
     after = yield from read_parameters(peer, names)
     changes = tuple(

@@ -74,11 +74,7 @@ _COMMAND_RESULTS = {
     2: "DENIED (not as it was asked, or in the state that it is in)",
     3: "UNSUPPORTED (it does not know the command)",
     4: "FAILED (it tried, or checked, and it did not work)",
-    5: "IN_PROGRESS",
     6: "CANCELLED (by somebody else)",
-    7: "COMMAND_LONG_ONLY (it takes the command in another message)",
-    8: "COMMAND_INT_ONLY (it takes the command in another message)",
-    9: "COMMAND_UNSUPPORTED_MAV_FRAME (it does not take the command's frame)",
     10: "NOT_IN_CONTROL (another station is in control of it)",
 }
 

@@ -6,20 +6,9 @@ from typing import Any, Literal, TypeAlias
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.autopilot.manners import Manners
+from faao_mav.wire import messages
 from faao_mav.wire.machine import AT_ONCE, SILENCE, SLOWEST, Pace, Questions, Script, Talk
-from faao_mav.wire.messages import (
-    Envelope,
-    Heartbeat,
-    ListMessage,
-    MissionAck,
-    MissionClearAll,
-    MissionCount,
-    MissionItemInt,
-    MissionRequestInt,
-    MissionRequestList,
-    Statustext,
-    WireItem,
-)
+from faao_mav.wire.messages import Envelope, ListMessage, MissionAck, WireItem
 from faao_mav.wire.protocol import Address, MavResult, MissionType
 from faao_mav.wire.wire_items import Difference
 
@@ -68,7 +57,7 @@ class Peer:
     may_be_armed: bool = False
     pace: Pace = field(default_factory=Pace)
     late: float = 0.0
-    beat: Heartbeat | None = None
+    beat: messages.Heartbeat | None = None
 
     @property
     def manners(self) -> Manners:
@@ -107,7 +96,11 @@ class PartReport:
 
 
 class _Exchange(Questions[int]):
-    """One list on its way: its questions, and what the vehicle says."""
+    """One list on its way: its questions, and what the vehicle says.
+
+    `item` is the number of the item last asked for; `doubted` what the vehicle said last, if that
+    was a no that may be about something else.
+    """
 
     def __init__(self, line: Script[Any], peer: Peer, part: MissionType, *, writes: bool) -> None:
         super().__init__(line, peer.pace, SILENCE)
@@ -115,9 +108,7 @@ class _Exchange(Questions[int]):
         self._writes = writes and not peer.may_be_armed
         self._texts: list[str] = []
         self.item: int | None = None
-        """The number of the item last asked for."""
         self.doubted: int | None = None
-        """What the vehicle said last, if it was no that may be about something else."""
 
     @property
     def over(self) -> bool:
@@ -145,13 +136,9 @@ class _Exchange(Questions[int]):
         """Return what the vehicle says of the list; None: it is over."""
         while not self.over:
             heard = yield from self.hear()
-            message = heard and heard.said(self._peer.address, ListMessage)
-            if (
-                message
-                and message.mission_type == self._part
-                and self._peer.own.takes(message.target)
-            ):
-                return message
+            told = heard and heard.said(self._peer.address, ListMessage)
+            if told and told.mission_type == self._part and self._peer.own.takes(told.target):
+                return told
         return None
 
     def listen(self, seconds: float) -> Talk[None]:
@@ -168,8 +155,9 @@ class _Exchange(Questions[int]):
             self.cancel()
             raise
         if heard is not None:
-            self._peer.beat = heard.said(self._peer.address, Heartbeat) or self._peer.beat
-            if text := heard.said(self._peer.address, Statustext):
+            vehicle = self._peer.address
+            self._peer.beat = heard.said(vehicle, messages.Heartbeat) or self._peer.beat
+            if text := heard.said(vehicle, messages.Statustext):
                 self._texts = [*self._texts[1 - _TEXTS :], text.text.strip()]
         return heard
 
@@ -221,15 +209,15 @@ def send_list(
 
     def send(seq: int) -> None:
         numbers = (seq + 1, seq) if pairs and seq + 1 < last else (seq,)
-        *ahead, item = (MissionItemInt(peer.address, part, each, items[each]) for each in numbers)
-        exchange.put(seq, item, again=(*ahead, item))
+        again = [messages.MissionItemInt(peer.address, part, each, items[each]) for each in numbers]
+        exchange.put(seq, again[-1], again=tuple(again))
         if peer.vehicle is None:
             exchange.asked.clear()
 
     current = furthest = _OPENING
     if not exchange.over:
-        count = MissionCount(peer.address, part, len(items))
-        exchange.put(_OPENING, count if items else MissionClearAll(peer.address, part))
+        count = messages.MissionCount(peer.address, part, len(items))
+        exchange.put(_OPENING, count if items else messages.MissionClearAll(peer.address, part))
     while True:
         line.progress = what, furthest + 1, len(items)
         exchange.item = None if current == _OPENING else current
@@ -238,7 +226,7 @@ def send_list(
                 return exchange.end("unknown", exchange.doubted)
             case None:
                 return exchange.stop()
-            case MissionRequestInt(seq=seq) if seq <= last:
+            case messages.MissionRequestInt(seq=seq) if seq <= last:
                 if seq > current:
                     exchange.answer(current)
                 elif seq < current:
@@ -287,15 +275,15 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
         items, count, following = dict[int, WireItem](), -1, 0
         exchange.asked.clear()
         exchange.further()
-        exchange.put(_OPENING, MissionRequestList(peer.address, part))
+        exchange.put(_OPENING, messages.MissionRequestList(peer.address, part))
         while len(items) != count:
             line.progress = f"reading {part.title}", len(items), max(count, 0)
             match (yield from exchange.said()):
                 case None:
                     break
-                case MissionCount() as told if exchange.answer(_OPENING):
+                case messages.MissionCount() as told if exchange.answer(_OPENING):
                     count = told.count
-                case MissionItemInt(seq=seq, item=item) if exchange.answer(seq):
+                case messages.MissionItemInt(seq=seq, item=item) if exchange.answer(seq):
                     items[seq] = item
                 case MissionAck(type=result) if result in _OF_UPLOADS:
                     exchange.doubt(result)
@@ -308,7 +296,8 @@ def read_list(peer: Peer, part: MissionType = MissionType.MISSION) -> Talk[PartR
             exchange.further()
             room = _WINDOW if wide and exchange.pace.mean is not None else 1
             while following < count and len(exchange.asked) < room:
-                exchange.put(following, MissionRequestInt(peer.address, part, following))
+                request = messages.MissionRequestInt(peer.address, part, following)
+                exchange.put(following, request)
                 following += 1
         else:
             ack = MissionAck(peer.address, part, MavResult.ACCEPTED)

@@ -15,10 +15,8 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 from faao_mav.errors import InputError, LinkError
 from faao_mav.wire.codec import Framer
 
-FORMS = (
-    "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
-    "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
-)
+FORMS = """udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), \
+tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"""
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
 _CONNECT_TIMEOUT = 5.0  # Seconds to wait for a TCP connection. Chosen.
 
@@ -29,9 +27,7 @@ _WRITE_TIMEOUT = 5.0
 _FORGET = 30.0
 """Seconds after which a silent UDP sender is not answered any more: chosen, 30 lost heartbeats."""
 
-_MOST_PEERS = (
-    64  # UDP senders that are remembered, and TCP peers, at most. Chosen: each is sent all.
-)
+_MOST_PEERS = 64  # UDP senders that are remembered, and TCP peers, at most. Chosen: each gets all.
 _BURST = 256  # Datagrams read at once: who sends without end stops nothing else. Chosen.
 
 _REASONS = {
@@ -256,9 +252,8 @@ class _Serial:
         self._name, self._framer = device, Framer()
         self._late: type[Exception] = serial.SerialTimeoutException
         if "/" in device and not Path(device).exists():
-            raise InputError(
-                f"connection {device!r}: there is no such device; is the vehicle plugged in?"
-            )
+            told = "there is no such device; is the vehicle plugged in?"
+            raise InputError(f"connection {device!r}: {told}")
         try:
             self._port: Any = serial.Serial(device, baud, timeout=0, write_timeout=_WRITE_TIMEOUT)
         except (ValueError, OSError) as error:
@@ -278,10 +273,9 @@ class _Serial:
             self._port.write(data)
         except self._late:
             self._port.reset_output_buffer()  # closing waits for what is in it
-            raise LinkError(
-                f"{self._name}: it has taken no bytes for {_WRITE_TIMEOUT:g} s; is the vehicle "
-                "switched on, and the cable or radio in order?"
-            ) from None
+            told = f"it has taken no bytes for {_WRITE_TIMEOUT:g} s"
+            which = "is the vehicle switched on, and the cable or radio in order?"
+            raise LinkError(f"{self._name}: {told}; {which}") from None
         except OSError as error:
             raise LinkError(f"{self._name}: {error}") from None
 

@@ -11,13 +11,12 @@ from faao_mav.wire.messages import GlobalPositionInt, HomePosition
 
 HOME_AWAY = 20.0
 """The farthest that a vehicle may stand from its mission's home, m. Chosen: several times the error
-of satellite navigation and of a click on a map (3 to 10 m), and small beside the margins of fences
-and the ways from home to the first place and back, which are planned from home."""
+of satellite navigation and of a click on a map (3 to 10 m), and small beside fences' margins."""
 
 HOME_HIGHER = 10.0
-"""The most by which it may stand higher or lower than its mission's home, m. Heights of a mission
-count from where the vehicle stands: one that stands 30 m lower flies 30 m lower everywhere. Chosen:
-what the heights of satellite navigation and of terrain maps differ by in 19 of 20 places."""
+"""The most by which it may stand higher or lower, m: the mission's heights count from where the
+vehicle stands. Chosen: what the heights of satellite navigation and of terrain maps differ by in 19
+of 20 places."""
 
 FIRST_AWAY, FIRST_FARTHEST = 500.0, 10_000.0
 """The farthest that the mission's first place may be from where it stands, m: where no home tells

@@ -6,20 +6,13 @@ are one less on the wire.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from faao_mav.autopilot import VehicleType
 from faao_mav.errors import InputError
-from faao_mav.mission.command import (
-    ABOVE_HOME,
-    ABOVE_SEA,
-    ABOVE_TERRAIN,
-    FLOWN_TO,
-    Command,
-    Frame,
-)
+from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, ABOVE_TERRAIN, FLOWN_TO, Command, Frame
 from faao_mav.mission.fence import RallyPoint, check_place
 from faao_mav.mission.item import (
     Home,
@@ -45,10 +38,7 @@ _SINGLE = 2e-7  # The relative difference that single precision does not tell.
 _SAME_FRAMES = {5: 0, 6: 3, 11: 10}
 """Frames with the same meaning: those ending in _INT, and what they are called without."""
 
-_FIELDS = (
-    *("command", "frame", "autocontinue"),
-    *("param1", "param2", "param3", "param4", "x", "y", "z"),
-)
+_FIELDS = ("command", "frame", "autocontinue", *(f"param{n}" for n in range(1, 5)), "x", "y", "z")
 
 
 def coordinate_scale(frame: int) -> float:
@@ -83,10 +73,15 @@ def wire_items(
     else:
         items = tuple(_jump_moved(item, -1) for item in mission.items)
     first = 0 if mission_type is MissionType.MISSION else None
-    return tuple(
-        wire_item(_without_nan(item, index, vehicle), index, current=index == first)
-        for index, item in enumerate(items)
-    )
+    who = "an autopilot unknown here" if vehicle is None else vehicle.family.name
+    for index, item in enumerate(items):
+        place = {"latitude": item.x, "longitude": item.y, "altitude": item.z}
+        unset = " and ".join(name for name, value in place.items() if math.isnan(value))
+        if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
+            told = f"item {index}: {unset} not set, which {who} would take for 0: give the place"
+            raise InputError(told)
+    sent = items if vehicle is None else map(vehicle.dialect.sent, items)
+    return tuple(wire_item(item, n, current=n == first) for n, item in enumerate(sent))
 
 
 def mission_item(item: WireItem) -> MissionItem:
@@ -112,9 +107,7 @@ def mission_of(
             if any(map(math.isinf, (*item.params, item.z))):
                 told = f"params {item.params}, z {item.z}"
                 raise InputError(f"{name}: {told}; expected finite numbers")
-    flown, fence, rally = (
-        [mission_item(item) for item in lists.get(mission_type, ())] for mission_type in MissionType
-    )
+    flown, fence, rally = ([*map(mission_item, lists.get(part, ()))] for part in MissionType)
     home = None
     if not home_items(vehicle, MissionType.MISSION):
         flown = [_jump_moved(item, 1) for item in flown]
@@ -131,19 +124,6 @@ def _jump_moved(item: MissionItem, by: int) -> MissionItem:
     return replace(item, params=(item.params[0] + by, *item.params[1:]))
 
 
-def _without_nan(item: MissionItem, index: int, vehicle: VehicleType | None) -> MissionItem:
-    """Return `item` as `vehicle` is sent it; see `wire_items`."""
-    place = {"latitude": item.x, "longitude": item.y, "altitude": item.z}
-    unset = [name for name, value in place.items() if math.isnan(value)]
-    if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
-        who = "an autopilot unknown here" if vehicle is None else vehicle.family.name
-        raise InputError(
-            f"item {index}: {' and '.join(unset)} not set, which {who} would take for 0: give the "
-            "place"
-        )
-    return item if vehicle is None else vehicle.dialect.sent(item)
-
-
 def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireItem:
     """Return `item`, number `index` of its list, as the wire carries it.
 
@@ -152,17 +132,13 @@ def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireIt
     scale = coordinate_scale(item.frame)
     x, y = (0 if math.isnan(value) else round(value * scale) for value in (item.x, item.y))
     if x not in _INT32 or y not in _INT32:
-        raise InputError(
-            f"item {index}: x {item.x}, y {item.y}; expected degrees within 180, or in frame "
-            f"{item.frame} what 32 bits hold"
-        )
+        expected = f"degrees within 180, or in frame {item.frame} what 32 bits hold"
+        raise InputError(f"item {index}: x {item.x}, y {item.y}; expected {expected}")
     if any(abs(value) > _FLOAT32 for value in (*item.params, item.z)):
-        raise InputError(
-            f"item {index}: params {item.params}, z {item.z}; expected single-precision numbers"
-        )
-    return WireItem(
-        item.command, item.frame, item.params, x, y, item.z, int(current), int(item.autocontinue)
-    )
+        told = f"params {item.params}, z {item.z}"
+        raise InputError(f"item {index}: {told}; expected single-precision numbers")
+    flags = int(current), int(item.autocontinue)
+    return WireItem(item.command, item.frame, item.params, x, y, item.z, *flags)
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,34 +188,26 @@ def compare(
     if len(sent) != len(found):
         given, there = (len(items[home:]) for items in (sent, found))
         differences.append(Difference(part, None, "count", given, there, "wrong"))
-    for index, (one, other) in enumerate(zip(sent[home:], found[home:], strict=False)):
-        differences += _compare(mission_item(one), mission_item(other), index, part, vehicle)
+    flown, dialect = part is MissionType.MISSION, None if vehicle is None else vehicle.dialect
+    for index, pair in enumerate(zip(sent[home:], found[home:], strict=False)):
+        one, other = map(mission_item, pair)
+        known = not flown or dialect is None or dialect.is_known(one.command)
+        stored = one if dialect is None else dialect.stored(one)
+        values = [
+            (each.command, each.frame, each.autocontinue, *each.numbers)
+            for each in (one, other, stored)
+        ]
+        for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
+            unset = math.isnan(was) and is_ == 0
+            idle = field == "autocontinue" and not flown
+            lost = _same(field, kept, is_, other.frame)
+            if unset or idle or _same(field, was, is_, one.frame) or (lost and field == "frame"):
+                continue
+            # What is not known to be kept may be lost, but not replaced.
+            lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
+            kind: Literal["dropped", "wrong"] = "dropped" if lost else "wrong"
+            differences.append(Difference(part, index, field, was, is_, kind))
     return tuple(differences)
-
-
-def _compare(
-    sent: MissionItem,
-    found: MissionItem,
-    index: int,
-    part: MissionType,
-    vehicle: VehicleType | None,
-) -> Iterator[Difference]:
-    flown = part is MissionType.MISSION
-    known = not flown or vehicle is None or vehicle.dialect.is_known(sent.command)
-    stored = sent if vehicle is None else vehicle.dialect.stored(sent)
-    values = [
-        (each.command, each.frame, each.autocontinue, *each.numbers)
-        for each in (sent, found, stored)
-    ]
-    for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
-        unset = math.isnan(was) and is_ == 0
-        idle = field == "autocontinue" and not flown
-        lost = _same(field, kept, is_, found.frame)
-        if unset or idle or _same(field, was, is_, sent.frame) or (lost and field == "frame"):
-            continue
-        # What is not known to be kept may be lost, but not replaced.
-        lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
-        yield Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:

@@ -31,7 +31,6 @@ from faao_mav.autopilot import Track, Vehicle
 from faao_mav.fly.itinerary import LEVEL, NEAR
 from faao_mav.fly.preflight import Clearance, Flight
 from faao_mav.fly.stream import Stream
-from faao_mav.fly.telemetry import Held
 from faao_mav.fly.watch import Watch
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission, MissionItem
@@ -41,6 +40,7 @@ from faao_mav.plan.yaml_text import load_yaml
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages, protocol
+from faao_mav.wire.jobs import Held
 from faao_mav.wire.machine import AT_ONCE, Script, Talk
 from faao_mav.wire.messages import CommandLong, Envelope, Heartbeat, Message
 from faao_mav.wire.parameters import Reading

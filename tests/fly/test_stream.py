@@ -17,13 +17,12 @@ from faao_mav import optimize, parse_plan
 from faao_mav.arrays import Real
 from faao_mav.autopilot import vehicle_type
 from faao_mav.errors import InfeasibleError, InputError
-from faao_mav.fly.itinerary import LEVEL, NEAR, Gate, Itinerary
+from faao_mav.fly.itinerary import LEVEL, NEAR, Course, Gate, Itinerary, at_rest
 from faao_mav.fly.preflight import Clearance, Flight
-from faao_mav.fly.setpoints import Course, OwnClock, at_rest
-from faao_mav.fly.stream import Stream
-from faao_mav.fly.telemetry import Held
+from faao_mav.fly.stream import OwnClock, Stream
 from faao_mav.geodesy import LocalFrame
 from faao_mav.wire import messages
+from faao_mav.wire.jobs import Held
 from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import GROUND_STATION
 from faao_mav.wire.transfer import Peer

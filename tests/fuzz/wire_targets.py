@@ -27,7 +27,7 @@ from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages
 from faao_mav.wire.codec import Codec, Framer, message_id
 from faao_mav.wire.discover import FoundVehicle, choose, discover
-from faao_mav.wire.jobs import UploadReport, download_lists, explain, upload_parts
+from faao_mav.wire.jobs import UploadReport, explain, read_held, upload_parts
 from faao_mav.wire.machine import Machine, Script, Talk, ask_alive, ask_for
 from faao_mav.wire.protocol import GROUND_STATION, HOME_POSITION, MavCommand, MissionType
 from faao_mav.wire.signing import Signing
@@ -167,7 +167,7 @@ def _jobs(peer: Peer) -> Iterator[Machine[Any]]:
     """Return all that a client does once it has found a vehicle."""
     lists = [(part, wire_items(_MISSION, part, peer.vehicle)) for part in MissionType]
     yield Script(upload_parts(lists, peer))
-    yield Script(download_lists(tuple(MissionType), peer))
+    yield Script(read_held(peer, parameters=False))
     yield Script(_asks(peer))
     yield Script(upload_parts([(MissionType.FENCE, ()), (MissionType.RALLY, ())], peer))
 
