@@ -13,7 +13,7 @@ from faao_mav.wire.machine import Talk, ask_for
 from faao_mav.wire.messages import HomePosition, WireItem
 from faao_mav.wire.parameters import Change, Reading, read_parameters
 from faao_mav.wire.protocol import HOME_POSITION, MavResult, MissionType, listed, meaning
-from faao_mav.wire.transfer import PartReport, Peer
+from faao_mav.wire.transfer import ATTEMPTS, PartReport, Peer
 from faao_mav.wire.whereabouts import Whereabouts, home_in
 from faao_mav.wire.wire_items import Difference, compare, home_items
 
@@ -82,7 +82,7 @@ def upload_parts(
     reports: list[PartReport] = []
     for part, items in parts:
         rows = len(items[home_items(peer.vehicle, part) :])
-        for attempt in range(1, transfer.ATTEMPTS + 1):
+        for attempt in range(1, ATTEMPTS + 1):
             report = yield from transfer.send_list(items, peer, part)
             if report.verdict in ("accepted", "unknown"):
                 read = yield from transfer.read_list(peer, part)
