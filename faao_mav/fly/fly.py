@@ -152,14 +152,14 @@ class Radios:
         slot = min(int(max(planned, 0.0) / step + 1e-9), len(solution.t) - 1)
         if slot == self._last:
             return None
-        self._last, P = slot, (solution.P_B[slot], solution.P_U[slot])
-        P_B, P_U = (np.stack([each.real, each.imag], axis=-1).tolist() for each in P)
+        self._last = slot
+        precoders = solution.P_B[slot], solution.P_U[slot]
+        P_B, P_U = (np.stack([P.real, P.imag], axis=-1).tolist() for P in precoders)
+        share = None if solution.shares is None else float(solution.shares[slot])
+        steps = (None, None) if solution.steps is None else [int(n[slot]) for n in solution.steps]
         told = {"slot": slot, "t": t, "east": float(w[0]), "north": float(w[1])}
-        told |= {"P_B": P_B, "P_U": P_U}
-        told["receive_share"] = None if solution.shares is None else float(solution.shares[slot])
-        for n, name in enumerate(("step_B", "step_U")):
-            told[name] = None if solution.steps is None else int(solution.steps[n][slot])
-        return json.dumps(told)
+        told |= {"P_B": P_B, "P_U": P_U, "receive_share": share}
+        return json.dumps(told | {"step_B": steps[0], "step_U": steps[1]})
 
     def tell(self, t: float | None, w: Real) -> None:
         """Send the line of that slot, if it is another one."""

@@ -101,9 +101,11 @@ def read_log(path: Path, system: int | None = None) -> "list[FlightRecord]":
     if system is not None and ending != ".tlog":
         raise InputError(f"--system {system}: {path} is the log of one vehicle; that is for .tlog")
     command = [sys.executable, "-P", "-m", __name__, str(path), str(system or 0)]
-    how: dict[str, Any] = {"capture_output": True, "env": os.environ | _ENVIRONMENT}
+    environment = os.environ | _ENVIRONMENT
     try:
-        read = subprocess.run(command, **how, timeout=_PATIENCE, check=False)
+        read = subprocess.run(
+            command, capture_output=True, env=environment, timeout=_PATIENCE, check=False
+        )
     except subprocess.TimeoutExpired:
         text = f"{path}: not read within {_PATIENCE:g} s; expected the log of a flight"
         raise InputError(text) from None

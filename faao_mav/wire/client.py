@@ -26,10 +26,14 @@ from faao_mav.wire.wire_items import mission_of, wire_items
 
 _PASSED_OVER: dict[Verdict, str] = {
     "forged": "packets come that are signed with another key than the one in {key}",
-    "old": """packets come that are signed with this key, but not later than those before: of a \
-recording, or of a vehicle whose clock is behind and that does not hear this station""",
-    "unsigned": """packets come that are not signed: set the vehicle up to sign them with this \
-key, or leave out --signing-key""",
+    "old": (
+        "packets come that are signed with this key, but not later than those before: of a "
+        "recording, or of a vehicle whose clock is behind and that does not hear this station"
+    ),
+    "unsigned": (
+        "packets come that are not signed: set the vehicle up to sign them with this key, or leave "
+        "out --signing-key"
+    ),
 }
 """Why no vehicle is heard where packets come that have to be signed."""
 

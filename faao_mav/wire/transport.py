@@ -15,8 +15,10 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 from faao_mav.errors import InputError, LinkError
 from faao_mav.wire.codec import Framer
 
-FORMS = """udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), \
-tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"""
+FORMS = (
+    "udpin:HOST:PORT (listen), udpout:HOST:PORT (send), tcp:HOST:PORT (connect), "
+    "tcpin:HOST:PORT (listen) or a serial port as DEVICE,BAUD"
+)
 _KINDS = ("udp", "udpin", "udpout", "tcp", "tcpin")
 _CONNECT_TIMEOUT = 5.0  # Seconds to wait for a TCP connection. Chosen.
 
