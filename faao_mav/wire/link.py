@@ -145,6 +145,8 @@ class WireLink:
                 raise LinkError(f"{end}, {text}") from None
             self._send(machine.cancel(time.monotonic()))
             raise LinkError(f"interrupted {text}: cancelled") from None
+        finally:
+            talk.close()  # here, not whenever what is left of it is collected
 
     def watch(self, machine: Machine[T], observe: Callable[[], object], *, beats: bool) -> T:
         """Run `machine` to its end and return the outcome; `observe` is called after every step.
