@@ -1,5 +1,7 @@
 """The precoders of highest rate: closed forms, classical schemes, other searches, extremes."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from closed_forms import bpsk_two_antennas_rate, channel, log_sum, power_of
@@ -29,8 +31,10 @@ def best(
     return P, cutoff_rate(H, P, difference_classes(modulation, H.shape[-1]), 1.0)
 
 
-@pytest.mark.parametrize("measure", ["cutoff", "mutual_information"])
-@pytest.mark.parametrize(("modulation", "draws"), [("qpsk", 1), ("8psk", 2)])
+@pytest.mark.parametrize(
+    ("measure", "modulation", "draws"),
+    [("cutoff", "8psk", 2), ("mutual_information", "qpsk", 1)],
+)
 def test_no_other_precoder_near_it_is_better(measure: Measure, modulation: str, draws: int) -> None:
     H = channel(3, 2, draws, 2, 2)
     P = best_precoders(H, 3.0, modulation, 1.0, measure=measure)
@@ -58,10 +62,14 @@ def test_closed_forms(seed: int, snr: float, receive: int) -> None:
 
 
 @pytest.mark.figures
-@pytest.mark.parametrize(("snr_db", "expected"), [(0, 2.2761), (5, 3.5514), (10, 3.9964)])
-def test_known_qpsk_rates(snr_db: float, expected: float) -> None:
-    _, rate = best(TABLE * 10.0 ** (snr_db / 20.0), 2.0, "qpsk")
-    assert rate == pytest.approx(expected, abs=6e-5)
+def test_known_qpsk_rates() -> None:
+    for snr_db, expected in ((0, 2.2761), (5, 3.5514), (10, 3.9964)):
+        _, rate = best(TABLE * 10.0 ** (snr_db / 20.0), 2.0, "qpsk")
+        assert rate == pytest.approx(expected, abs=6e-5)
+    # at -5 dB 1.6376 bit on one mode, 1.4958 on those of the highest cutoff rate
+    H = TABLE[None] * 10**-0.25
+    P = best_precoders(H, 2.0, "qpsk", 1.0, measure="mutual_information")
+    assert mutual_information(H, P[None], "qpsk", 1.0)[0] > 1.63
 
 
 @SETTINGS
@@ -86,9 +94,7 @@ def test_never_below_the_classical_schemes(
         assert np.all(rate >= cutoff_rate(H, P, classes, 1.0) - 1e-6)
 
 
-@pytest.mark.parametrize(
-    ("modulation", "W", "seed"), [("qpsk", 4.0, 2), ("qpsk", 12.0, 3), ("8psk", 8.0, 4)]
-)
+@pytest.mark.parametrize(("modulation", "W", "seed"), [("qpsk", 12.0, 3), ("8psk", 8.0, 4)])
 def test_as_good_as_many_random_starts(modulation: str, W: float, seed: int) -> None:
     """Beside the least log-sum of 10 searches by a general optimiser from random points."""
     H = channel(seed, 2, 2)
@@ -117,21 +123,18 @@ def test_channels_that_lead_nowhere() -> None:
     np.testing.assert_allclose(best(silent, 2.0, "qpsk")[1], best(H, 2.0, "qpsk")[1], rtol=1e-5)
 
 
-@pytest.mark.parametrize("modulation", ["bpsk", "qpsk", "16qam"])
-@pytest.mark.parametrize("snr", [1e-12, 1e-5, 1e4, 1e9])
-def test_extremes(modulation: str, snr: float) -> None:
+def test_extremes() -> None:
     H = channel(8, 4, 2, 2)
-    P, rate = best(H, snr, modulation)
-    bits = difference_classes(modulation, 2).bits
-    assert np.all(np.isfinite(log_sum(H, P, modulation)))
     largest = np.linalg.svd(H, compute_uv=False)[:, 0]
-    if snr < 1e-4:  # all on the strongest mode: R_0 = mean of D / ln 2, E||H P u||² = 2 λ² W
-        expected = snr * largest**2 / 2.0 / np.log(2.0)
-        np.testing.assert_allclose(rate, expected, rtol=1e-4, atol=1e-14)
-    else:
-        np.testing.assert_allclose(rate, bits, atol=1e-6)
-    mean = best_precoders(H[None], snr, modulation, 1.0)
-    assert np.all(np.isfinite(mean))
+    for modulation, snr in product(("bpsk", "qpsk", "16qam"), (1e-12, 1e-5, 1e4, 1e9)):
+        P, rate = best(H, snr, modulation)
+        assert np.all(np.isfinite(log_sum(H, P, modulation)))
+        if snr < 1e-4:  # all on the strongest mode: R_0 = mean of D / ln 2, E||H P u||² = 2 λ² W
+            expected = snr * largest**2 / 2.0 / np.log(2.0)
+            np.testing.assert_allclose(rate, expected, rtol=1e-4, atol=1e-14)
+        else:
+            np.testing.assert_allclose(rate, difference_classes(modulation, 2).bits, atol=1e-6)
+        assert np.all(np.isfinite(best_precoders(H[None], snr, modulation, 1.0)))
 
 
 @SETTINGS
@@ -170,13 +173,6 @@ def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
     assert np.mean(rate) > np.mean(known)
     # but not the precoders of somebody who knows the fading
     assert np.all(rate <= np.mean(best(draws, W, modulation)[1], axis=1))
-
-
-def test_more_mutual_information_than_the_precoders_of_the_cutoff_rate() -> None:
-    """At -5 dB 1.6376 bit on one mode, 1.4958 on those of the highest cutoff rate."""
-    H = np.array([[[2.0, 1.0], [1.0, 1.0]]]) * np.sqrt(10**-0.5 / 2)
-    P = best_precoders(H, 2.0, "qpsk", 1.0, measure="mutual_information")
-    assert mutual_information(H, P[None], "qpsk", 1.0)[0] > 1.63
 
 
 def test_unusable_input() -> None:

@@ -5,21 +5,17 @@ from faao_mav.errors import InputError
 from faao_mav.radio.channel import balanced_rayleigh, line_of_sight_ula, rayleigh, rician
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("horizontal", [(120.0, -40.0), (-70.0, 200.0)])
-def test_ula_agrees_with_the_positions_of_the_elements(
-    sign: float, horizontal: tuple[float, float]
-) -> None:
+def test_ula_agrees_with_the_positions_of_the_elements() -> None:
     wavelength = 1e-4
-    path = sign * np.array([*horizontal, 100.0])
     east = np.array([0.5 * wavelength, 0.0, 0.0])
     transmitters = np.arange(2)[:, None] * east
-    receivers = path + np.arange(3)[:, None] * east
-    way = np.linalg.norm(receivers[:, None] - transmitters, axis=-1)
-    expected = np.exp(-2j * np.pi * (way - way[0, 0]) / wavelength)
-    H = line_of_sight_ula(path, 3, 2)
-    np.testing.assert_allclose(H, expected, atol=1e-4)
-    assert np.abs(H - expected.conj()).max() > 0.5  # the other sign would not pass
+    for path in np.array([[120.0, -40.0, 100.0], [70.0, -200.0, -100.0]]):
+        receivers = path + np.arange(3)[:, None] * east
+        way = np.linalg.norm(receivers[:, None] - transmitters, axis=-1)
+        expected = np.exp(-2j * np.pi * (way - way[0, 0]) / wavelength)
+        H = line_of_sight_ula(path, 3, 2)
+        np.testing.assert_allclose(H, expected, atol=1e-4)
+        assert np.abs(H - expected.conj()).max() > 0.5  # the other sign would not pass
 
 
 def test_rayleigh_has_unit_power_and_repeats() -> None:

@@ -34,9 +34,8 @@ def off(shadow: Spline, value: Real, x: Real, y: Real) -> float:
     return float(np.sqrt(np.mean((shadow.value(x, y) - value) ** 2)))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_field_between_the_legs_is_told_and_nothing_far_away(seed: int) -> None:
-    shadow = field(seed, 4.0)
+def test_a_field_between_the_legs_is_told_and_nothing_far_away() -> None:
+    shadow = field(1, 4.0)
     fit = fit_link([flight(shadow, 1.0)], 1.0)
     found, alone, error = kriged(fit, STATION)
     assert found is not None

@@ -19,7 +19,7 @@ def parallel(A: RealOrComplex, B: RealOrComplex) -> None:
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
-def test_shape_power_and_batches(scheme: str) -> None:
+def test_shape_power_batches_and_singular_channels(scheme: str) -> None:
     for (receive, transmit), scale in product(SHAPES, (1e-8, 1.0, 1e5)):
         H = scale * channel(1, 3, 4, receive, transmit)
         P = SCHEMES[scheme](H, 0.1, 1e-3)
@@ -27,10 +27,6 @@ def test_shape_power_and_batches(scheme: str) -> None:
         assert P.dtype == np.complex128
         np.testing.assert_allclose(power_of(P), 0.1, rtol=1e-12)
         np.testing.assert_allclose(SCHEMES[scheme](H[1, 2], 0.1, 1e-3), P[1, 2], atol=1e-12)
-
-
-@pytest.mark.parametrize("scheme", SCHEMES)
-def test_singular_and_zero_channels(scheme: str) -> None:
     H = np.array([[[1.0, 1.0], [1.0, 1.0]], [[1.0, 0.0], [0.0, 0.0]], [[0.0, 0.0], [0.0, 0.0]]])
     P = SCHEMES[scheme](H, 2.0, 1.0)
     assert np.all(np.isfinite(P))
@@ -40,10 +36,15 @@ def test_singular_and_zero_channels(scheme: str) -> None:
     np.testing.assert_allclose(np.abs(P[2]), np.eye(2), atol=1e-12)
 
 
-def test_zero_forcing_makes_the_link_diagonal() -> None:
+def test_mmse_lies_between_maximum_ratio_and_zero_forcing() -> None:
     for receive, transmit in SHAPES:
-        if receive <= transmit:
-            H = channel(2, receive, transmit)
+        H = channel(5, receive, transmit)
+        np.testing.assert_allclose(mmse(H, 2.0, 1e-12), zf(H, 2.0, 1.0), atol=1e-8)
+        np.testing.assert_allclose(mmse(H, 2.0, 1e12), mrt(H, 2.0, 1.0), atol=1e-8)
+        if receive == transmit:
+            inverse = np.linalg.inv(H @ H.conj().T + receive * 0.7 / 2.0 * np.eye(receive))
+            parallel(mmse(H, 2.0, 0.7), H.conj().T @ inverse)
+        if receive <= transmit:  # zero forcing makes the link diagonal
             link = H @ zf(H, 3.0, 1.0)
             expected = np.zeros((receive, transmit))
             np.fill_diagonal(expected, link[0, 0].real)
@@ -52,16 +53,6 @@ def test_zero_forcing_makes_the_link_diagonal() -> None:
     # With more receiving antennas, the link is orthogonal: no stream disturbs another.
     link = (H := channel(3, 4, 2)) @ zf(H, 3.0, 1.0)
     parallel(link.conj().T @ link, np.eye(2))
-
-
-@pytest.mark.parametrize(("receive", "transmit"), SHAPES)
-def test_mmse_lies_between_maximum_ratio_and_zero_forcing(receive: int, transmit: int) -> None:
-    H = channel(5, receive, transmit)
-    np.testing.assert_allclose(mmse(H, 2.0, 1e-12), zf(H, 2.0, 1.0), atol=1e-8)
-    np.testing.assert_allclose(mmse(H, 2.0, 1e12), mrt(H, 2.0, 1.0), atol=1e-8)
-    if receive == transmit:
-        inverse = np.linalg.inv(H @ H.conj().T + receive * 0.7 / 2.0 * np.eye(receive))
-        parallel(mmse(H, 2.0, 0.7), H.conj().T @ inverse)
 
 
 @given(st.integers(0, 10_000), st.sampled_from(SHAPES), st.floats(-3.0, 4.0))
