@@ -12,27 +12,24 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.constraint import Grid, unknowns
-from faao_mav.optimizer.interior.limits import EnergyLimit
 from faao_mav.optimizer.interior.maximize import constraints_of
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.scaled import FlightVariables, flight_variables, minimize
+from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.relay import RelayQueue
 
 
-def still_gained(solution: Solution, reach: float = 1.0) -> float:
+def still_gained(solution: Solution) -> float:
     """Return the `kkt_residual` of `solution`, in what its plan maximises, bit/s/Hz/m."""
     problem = solution.problem
     return kkt_residual(
         problem.kinematics,
         rate_field(problem, design(solution.plan)),
         solution.trajectory,
-        reach=reach,
         relay=problem.maximised_queue,
         fence=problem.fence,
-        energy=problem.energy_limit(problem.kinematics),
     )
 
 
@@ -65,16 +62,6 @@ def _forwarded(
     if np.isfinite(relay.buffer):
         limits.append(queue <= (relay.buffer / time_step - now.queue) / unit)
     return forwarded, limits
-
-
-def _within(limit: EnergyLimit, now: Trajectory, flight: FlightVariables) -> Any:
-    """Return that `flight` keeps the energy `limit`, to first order about `now`."""
-    kin, power = flight.kinematics, limit.partials(now.v.T, now.a.T)
-    left = limit.most / kin.time_step - float(power.value.sum())
-    by_v = cp.sum(cp.multiply(power.by_v.T, flight.v * kin.max_speed - now.v))
-    by_a = cp.sum(cp.multiply(power.by_a.T, flight.a * kin.max_acceleration - now.a))
-    unit = limit.most / kin.time_step
-    return (by_v + by_a) / unit <= max(0.0, left) / unit
 
 
 _NEAR = 3.0
@@ -141,7 +128,6 @@ def kkt_residual(
     reach: float = 1.0,
     relay: RelayQueue | None = None,
     fence: FenceGeometry | None = None,
-    energy: EnergyLimit | None = None,
 ) -> float:
     """Return the best first-order gain of min_j F_j per metre, in rewards per metre.
 
@@ -154,8 +140,6 @@ def kkt_residual(
 
     With `fence` the distances of the path from what it has to keep out of are linear in the move,
     and in the turn of the half-planes that part it from them.
-
-    With `energy` what the flight takes is linear in the move, with the power's own derivatives.
 
     Linearised so, the feasible set is convex, and this is zero exactly where the conditions of
     Karush, Kuhn and Tucker hold. It is a convex problem: its optimum is that of Clarabel, to about
@@ -183,6 +167,4 @@ def kkt_residual(
         limits += [*queue, gain == cp.sum(forwarded) / slots]
     if fence is not None:
         limits += _apart(fence, kin, trajectory.w, shift, reach)
-    if energy is not None:
-        limits.append(_within(energy, trajectory, flight))
     return max(0.0, -float(minimize(-gain, limits).value)) * unit

@@ -1,9 +1,13 @@
-"""Feasible flights drawn at random, for the tests of bounds."""
+"""Feasible flights and maps of gains drawn at random, for the tests of bounds."""
+
+from dataclasses import replace
 
 import numpy as np
 
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
+from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.straight import straight_flight
+from faao_mav.radio.gain_map import Grid
 
 
 def random_flight(kin: Kinematics, seed: int) -> Trajectory:
@@ -17,3 +21,19 @@ def random_flight(kin: Kinematics, seed: int) -> Trajectory:
             return flight
         size *= 0.8
     return straight
+
+
+def rough_grid(seed: int, cells: int = 12, low: float = -40.0, high: float = 110.0) -> Grid:
+    """Return shadows of 20 dB that end within a cell."""
+    rng = np.random.default_rng(seed)
+    x, y = np.linspace(low, high, cells), np.linspace(low + 7, high - 3, cells + 3)
+    return Grid.through(x, y, np.where(rng.random((cells, cells + 3)) < 0.4, -20.0, 0.0))
+
+
+def with_maps(problem: Problem, seed: int) -> Problem:
+    """Return `problem` with a rough grid above the laws of either hop."""
+    first, second = (
+        replace(link, gains=replace(link.gains, above=rough_grid(seed + hop)))
+        for hop, link in enumerate(problem.links)
+    )
+    return replace(problem, bs_uav=first, uav_user=second)

@@ -44,19 +44,16 @@ def test_the_paper_plan_is_section_iv() -> None:
     flight, radio, vehicle = plan.flight, plan.radio, plan.vehicle
     assert (flight.start, flight.end, flight.altitude) == ((0, 350), (350, 0), 100)
     assert (flight.duration, flight.time_step, flight.slots) == (50, 0.2, 250)
-    assert flight.start_velocity is None
-    assert flight.end_velocity is None
+    assert flight.start_velocity is flight.end_velocity is None
     assert not flight.bound_first_acceleration
     assert (vehicle.max_speed, vehicle.max_acceleration) == (100, 5)
-    assert radio.base_station.position == (0, 0)
-    assert radio.ground_user.position == (300, 300)
-    for station in (radio.base_station, radio.relay, radio.ground_user):
-        assert station.antennas == 2
+    stations = radio.base_station, radio.relay, radio.ground_user
+    assert [station.antennas for station in stations] == [2, 2, 2]
+    assert (radio.base_station.position, radio.ground_user.position) == ((0, 0), (300, 300))
     assert radio.base_station.power == radio.relay.power == pytest.approx(0.1)
     assert radio.relay.noise == radio.ground_user.noise == pytest.approx(1e-15)
     assert radio.reference_gain == pytest.approx(1e-5)
-    assert radio.rician_factor == 3
-    assert radio.modulation == "bpsk"
+    assert (radio.rician_factor, radio.modulation) == (3, "bpsk")
 
 
 def test_values_are_those_of_yaml_1_2() -> None:
@@ -142,11 +139,8 @@ def test_a_plan_stands_without_the_file_of_its_fence(tmp_path: Path) -> None:
     assert plan.keep_in is not None
     assert again.keep_in.shape.symmetric_difference(plan.keep_in.shape).area < 1e-3
     square = [[8.54, 47.39], [8.55, 47.39], [8.55, 47.4], [8.54, 47.4]]
-    drawn = {
-        "type": "Feature",
-        "properties": {"name": "field"},
-        "geometry": {"type": "MultiPolygon", "coordinates": [[square], []]},
-    }
+    shape = {"type": "MultiPolygon", "coordinates": [[square], []]}
+    drawn = {"type": "Feature", "properties": {"name": "field"}, "geometry": shape}
     (tmp_path / "drawn.geojson").write_text(json.dumps(drawn))
     beside = {"site.origin": place, "fence": {"file": "drawn.geojson", "margin": 2}}
     plan = parse_plan(edited(SMALL, beside), str(tmp_path / "plan.yaml"))
@@ -183,26 +177,18 @@ def test_too_short_a_duration_says_how_long_it_takes() -> None:
 def test_text_that_is_no_plan() -> None:
     for text, part in (
         ("", "not nothing"),
-        ("- 1\n", "not list"),
         ("flight: [1\n", "line 2"),
         ("a: 1\nb: 2\na: 3\n", 'line 3, column 1: not valid YAML: found duplicate key "a"'),
         ("a: &x 1\nb: *x\n", "line 2, column 4: aliases"),
         ("{" * 100, "nested more than 20 deep"),
-        ("[" * 5_000, "nested more than 20 deep"),
         ('a: !!float ""\n', "line 1, column 4: tags (tag:yaml.org,2002:float) are not used"),
-        ("a: !!bool maybe\n", "line 1, column 4: tags (tag:yaml.org,2002:bool) are not used"),
-        ("a: !!timestamp abc\n", "line 1, column 4: tags"),
         ("a: !mine {b: 1}\n", "line 1, column 4: tags (!mine) are not used in plans"),
         ("a: {b: 1}\nc: {<<: *a}\n", "line 2, column 9: aliases"),
         ("? {a: 1}\n: 1\n", "line 1, column 3: not valid YAML: a key has to be a word"),
         ("? [a]\n: 1\n", "line 1, column 3: not valid YAML: a key has to be a word"),
         ("a: {1: 2}\n", "line 1, column 5: not valid YAML: a key has to be a word, not 1"),
         ("a: 1\n~: 2\n", "line 2, column 1: not valid YAML: a key has to be a word, not ~"),
-        (
-            "a:\n\tb: 1\n",
-            "line 2, column 1: not valid YAML: found character '\\t' that cannot start "
-            "any token; indent with spaces",
-        ),
+        ("a:\n\tb: 1\n", "found character '\\t' that cannot start any token; indent with spaces"),
         ("QGC WPL 110\n", "a mission, not a plan; faao-mission validate takes missions"),
         ('{\n "fileType": "Plan"}', "a mission, not a plan"),
         ("a: !!python/object:os.system 1\n", "line 1"),
@@ -214,9 +200,7 @@ def test_text_that_is_no_plan() -> None:
         with pytest.raises(PlanError, match=r"^p\.yaml: ") as caught:
             parse_plan(text, "p.yaml")
         assert part in str(caught.value)
-
-
-def test_method_replaces_the_plans() -> None:
+    # the method replaces the plan's
     with pytest.raises(PlanError, match=r"optimizer\.method: 'magic' is not accepted"):
         parse_plan(SMALL, method="magic")
     plan = parse_plan(SMALL + "optimizer: {tolerance: 1e-3}\n", method="algorithm1")
@@ -266,10 +250,7 @@ def test_a_changed_plan_is_checked_and_its_text_is_its_own() -> None:
     for key, value in (("radio.duplex", "hlf"), ("flight.height", 6), ("flight.end", object())):
         with pytest.raises(PlanError):
             plan.changed({key: value})
-
-
-def test_a_plan_is_not_replaced_past_its_check() -> None:
-    plan = parse_plan(SMALL)
+    # it is not replaced past its check
     with pytest.raises(InputError, match=r"plan\.changed"):
         replace(plan, flight=replace(plan.flight, duration=60))
     assert pickle.loads(pickle.dumps(plan)) == copy.deepcopy(plan) == plan

@@ -29,26 +29,19 @@ def published(v: float) -> float:
     )
 
 
-def level(v: float) -> float:
-    return float(TABLE.level(np.array(v)))
-
-
 def test_the_rotary_wing_is_that_of_the_paper() -> None:
-    assert level(0) == pytest.approx(168.5, rel=5e-3)
-    for v in np.linspace(0, 30, 61):
-        assert level(v) == pytest.approx(published(v), rel=5e-4)
-    speeds = np.linspace(5, 30, 25001)
-    theirs = np.vectorize(published)(speeds)
-    for per_metre in (1.0, speeds):  # of longest endurance, of longest range
-        best = speeds[(TABLE.level(speeds) / per_metre).argmin()]
-        assert best == pytest.approx(speeds[(theirs / per_metre).argmin()], rel=5e-3)
+    assert float(TABLE.level(np.array(0.0))) == pytest.approx(168.5, rel=5e-3)
+    speeds = np.linspace(0, 30, 2001)
+    theirs = np.array([published(v) for v in speeds])
+    assert TABLE.level(speeds) == pytest.approx(theirs, rel=5e-4)
 
 
 @settings(max_examples=10)
 @given(st.floats(50, 5000), st.floats(1, 20), st.floats(1, 2))
 def test_two_measured_powers_are_kept(hover: float, at: float, more: float) -> None:
     bare = RotaryWing(TABLE.blade, TABLE.induced, 120.0, TABLE.induced_speed, 0.0, 20.0)
-    cruise = more * hover * float(bare.level(np.array(at))) / level(0)
+    still, moving = bare.level(np.array([0.0, at]))
+    cruise = more * hover * moving / still
     fitted = TABLE.fitted(hover, cruise, at)
     assert float(fitted.level(np.array(0.0))) == pytest.approx(hover)
     assert float(fitted.level(np.array(at))) == pytest.approx(cruise)

@@ -1,20 +1,25 @@
-"""From a plan to a result, what it writes, and what is said of it."""
+"""From a plan to a result, what it writes, what is said of it, and what its relay delivers."""
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from conftest import MakePlan
 
-from faao_mav import plan_mission, read_mission, read_parameters
+from faao_mav import read_mission, read_parameters
 from faao_mav.autopilot import ARDUCOPTER
 from faao_mav.errors import FaaoError, InfeasibleError, InputError
-from faao_mav.optimizer.pricing import MutualInformation
+from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.pricing import MutualInformation, saturation
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.bound import Bound
 from faao_mav.report import summary
+from faao_mav.report.figures import plan_figures
 from faao_mav.report.summary import result_lines
-from faao_mav.workflow import Result, mission_files, optimize_plan
+from faao_mav.schedule.prediction import price_flight
+from faao_mav.workflow import Result, mission_files, optimize_plan, plan_mission
 
 QUICK = {"radio.fading": "none", "optimizer.starts": ["straight"]}
 FENCED = QUICK | {
@@ -121,7 +126,9 @@ def test_a_flight_without_a_mission_is_a_result(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_summary_of_a_flight_without_findings_is_short(result: Result) -> None:
+def test_a_summary_of_a_flight_without_findings_is_short(
+    result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert result.check is not None
     quiet = replace(
         result,
@@ -131,6 +138,7 @@ def test_a_summary_of_a_flight_without_findings_is_short(result: Result) -> None
         bound=Bound(2 * result.solution.rates.R_avg, exact=False),
     )
     text = summary(quiet, [Path("m.waypoints"), Path("m.param")])
+    assert "not compared" not in summary(quiet, verbose=True)
     assert "; no errors or warnings" in text
     assert len(text.splitlines()) <= 10
     assert "files        m.waypoints, m.param" in text
@@ -138,18 +146,12 @@ def test_a_summary_of_a_flight_without_findings_is_short(result: Result) -> None
         assert word not in text
         assert word in summary(quiet, verbose=True)
     stopped = replace(result.solution, converged=False, ending="stopped after 3 steps")
-    text = summary(replace(result, solution=stopped))
-    assert "NOT CONVERGED" in text
-    assert "stopped after 3 steps" in text
-
-
-def test_a_prediction_that_no_flight_has_confirmed_says_so(
-    result: Result, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert "not compared" not in summary(result, verbose=True)
+    # a type of vehicle that no recorded flight has confirmed, and a method that was stopped
     uncompared = replace(ARDUCOPTER, body=None)
     monkeypatch.setattr("faao_mav.autopilot.vehicle.vehicle_type", lambda *_: uncompared)
-    assert "not compared with recorded flights" in summary(result)
+    text = summary(replace(result, solution=stopped))
+    for word in ("NOT CONVERGED", "stopped after 3 steps", "not compared with recorded flights"):
+        assert word in text
     assert "not compared" in result.as_dict()["predicted"]["assumption"]
 
 
@@ -166,3 +168,62 @@ def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) 
         assert (told["rate"], told["gain_over_cutoff"]) == ("mutual_information", gain)
     told = result.as_dict()
     assert (told["rate"], told["gain_over_cutoff"]) == ("cutoff", None)
+
+
+BAND = {"radio.fading": "none", "radio.bandwidth_mhz": 20}
+HALF = {"radio.causal": True, "radio.duplex": "half", "radio.relay.buffer_mbytes": 30}
+
+
+@pytest.mark.parametrize("kind", [{}, HALF])
+def test_everything_tells_the_same(small_plan: MakePlan, kind: dict[str, Any]) -> None:
+    result = plan_mission(small_plan(BAND | kind))
+    told, solution = result.as_dict(), result.solution
+    assert told["delivered_rate"] == solution.delivered_rate <= told["average_rate"] + 1e-12
+    # bit/s/Hz on 20 MHz for 10 s, 8 bits a byte
+    assert told["delivered_mbytes"] == pytest.approx(25 * solution.delivered_rate)
+    assert told["mbit_per_second"]["average_rate"] == pytest.approx(20 * told["average_rate"])
+    predicted, flown = told["predicted"], result.prediction
+    assert flown is not None
+    assert predicted["delivered_rate"] == flown.delivered_rate == flown.relayed.rate
+    assert predicted["delivered_mbytes"] == pytest.approx(25 * flown.delivered_rate)
+    assert predicted["delivered_rate_by_position"] == flown.delivered_by_position
+
+    # the queue is in megabytes of a bit/s/Hz for half a second on 20 MHz
+    (axes,) = next(each.figure.axes for each in plan_figures(result) if each.heading == "Queue")
+    assert axes.get_ylabel() == "waiting, megabytes"
+    lines = {str(line.get_label()): np.asarray(line.get_ydata()) for line in axes.lines}
+    assert lines["planned"] == pytest.approx(1.25 * solution.relayed.queue)
+    if "buffer" in lines:
+        assert lines["planned"].max() <= 30 + 1e-6
+    assert ("buffer" in lines) == ("radio.relay.buffer_mbytes" in kind)
+
+    # the mission is judged by it
+    assert result.check is not None
+    link = result.check.link
+    assert link is not None
+    assert link.planned_delivered == solution.delivered_rate
+    assert link.predicted_delivered == pytest.approx(flown.delivered_rate, rel=1e-2)
+    assert link.predicted_mbytes == pytest.approx(25 * link.predicted_delivered)
+    worse = replace(link, predicted_rate=0.5 * link.planned_rate)
+    assert worse.share == (link.share if link.causal else 0.5)
+    worse = replace(link, predicted_delivered=0.4 * link.planned_delivered)
+    assert worse.share == pytest.approx(0.4)
+
+    # the planned flight delivers the plan
+    t = np.append(solution.t, solution.t[-1] + 30)
+    planned = price_flight(solution, t, np.vstack([solution.w, solution.w[-1:]]))
+    assert planned.delivered_rate == pytest.approx(solution.delivered_rate, abs=1e-9)
+
+
+def test_saturation_is_of_the_rate_that_is_planned_for(small_plan: MakePlan) -> None:
+    strong = {"radio.base_station.power_dbm": 50, "radio.relay.power_dbm": 50,
+              "radio.fading": "none", "radio.causal": True}  # fmt: skip
+    found = optimize(small_plan(strong))
+    told, full = Result(found).as_dict(), saturation(found)
+    assert told["delivered_rate"] > 0
+    assert told["delivered_mbytes"] is told["mbit_per_second"] is None  # without a bandwidth
+    assert full.ceiling == pytest.approx(2 * 19 / 20)  # nothing is forwarded in the first slot
+    assert 0 < full.spare_db < 300
+    half = saturation(optimize(small_plan(strong | {"radio.duplex": "half"})))
+    assert half.ceiling == pytest.approx(1.0)
+    assert half.saturated

@@ -27,7 +27,7 @@ from faao_mav.optimizer.algorithm1 import (
 from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.kinematics import LENGTH
 from faao_mav.optimizer.optimize import optimize
-from faao_mav.optimizer.problem import Problem, build_problem
+from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Progress
 from faao_mav.radio.constellation import difference_classes
@@ -38,7 +38,7 @@ COARSE = {"flight.time_step": 1}
 BRIEF = COARSE | {"optimizer.max_iterations": 1}
 
 
-def test_a_solution_proves_itself_and_tells_its_progress(paper_plan: MakePlan) -> None:
+def test_a_solution_proves_itself_and_its_rates_are_7_to_10(paper_plan: MakePlan) -> None:
     told: list[Progress] = []
     solution = optimize(paper_plan(COARSE), observe=told.append)
     assert solution.converged
@@ -52,10 +52,6 @@ def test_a_solution_proves_itself_and_tells_its_progress(paper_plan: MakePlan) -
     assert {p.stage for p in told} == {"trajectory (27)", "precoders (35)"}
     assert [p.best_rate for p in told] == sorted(p.best_rate for p in told)
     assert told[0].best_rate == solution.history[0]
-
-
-def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
-    solution = optimize(paper_plan(BRIEF))
     radio, altitude = solution.plan.radio, solution.plan.flight.altitude
     x = np.array([[a, b] for a in (1, -1) for b in (1, -1)])
     rates = []
@@ -78,7 +74,7 @@ def test_rates_are_7_to_10_by_brute_force(paper_plan: MakePlan) -> None:
 
 
 def test_a_scheme_keeps_its_precoder_and_flies_for_it(paper_plan: MakePlan) -> None:
-    solution = optimize(paper_plan(COARSE | {"optimizer.precoder": "mrt"}))
+    solution = optimize(paper_plan(BRIEF | {"optimizer.precoder": "mrt"}))
     assert max(solution.residuals().values()) < 1e-6
     radio = solution.plan.radio
     gain = radio.reference_gain / (np.sum(solution.w**2, axis=1) + 40.0**2)
@@ -88,18 +84,17 @@ def test_a_scheme_keeps_its_precoder_and_flies_for_it(paper_plan: MakePlan) -> N
     assert solution.rates.R_avg > solution.history[0]
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {
-            "radio.base_station.antennas": 3,
-            "radio.ground_user.antennas": 1,
-            "radio.line_of_sight": "all_ones",
-        },
-        {"flight.start_velocity": [0, 6], "flight.end_velocity": [5, -3]},
-        {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -60},
-    ],
-)
+ODD_ANTENNAS = {
+    "radio.base_station.antennas": 3,
+    "radio.ground_user.antennas": 1,
+    "radio.line_of_sight": "all_ones",
+    "flight.start_velocity": [0, 6],
+    "flight.end_velocity": [5, -3],
+}
+UNEQUAL = {"radio.base_station.power_dbm": 60, "radio.relay.power_dbm": -60}
+
+
+@pytest.mark.parametrize("changes", [ODD_ANTENNAS, UNEQUAL])
 def test_unusual_plans_are_solved(paper_plan: MakePlan, changes: dict[str, Any]) -> None:
     solution = optimize(paper_plan(BRIEF | changes))
     assert max(solution.residuals().values()) < 1e-6
@@ -141,7 +136,7 @@ def test_what_it_is_not_made_for_is_refused_before_it_is_tried(paper_plan: MakeP
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=10)
 @given(SEEDS, st.sampled_from([0.0, 1e-3, 1.0, 30.0, 1e4]))
 def test_27_has_the_bound_of_proposition_1(small_plan: MakePlan, seed: int, step: float) -> None:
     """exp(-D^lb), D^lb the tangent of D in ||w - p||²: never below exp(-D), and equal about w_i."""
@@ -198,25 +193,20 @@ def equal_power(link: Link, slots: int) -> Complex:
     return np.tile(np.sqrt(link.power / 2) * np.eye(2, dtype=complex), (slots, 1, 1))
 
 
-def sums_of(problem: Problem) -> tuple[SumOfExponentials, ...]:
-    """Both sums on the straight flight with equal-power precoders."""
-    w = straight_flight(problem.kinematics).w
-    return tuple(
-        link_sum(link, link.small_scale(w), equal_power(link, len(w))) for link in problem.links
-    )
-
-
 def test_rounding_errors_do_not_change_a_digit(paper_plan: MakePlan) -> None:
     """Another processor's last bits in the exponents and slopes leave flight and precoders."""
-    problem = build_problem(paper_plan({"flight.time_step": 1}))
+    problem = build_problem(paper_plan(COARSE))
     start, noise = straight_flight(problem.kinematics), np.random.default_rng(0)
-    sums = sums_of(problem)
+    w = start.w
+    sums = tuple(
+        link_sum(link, link.small_scale(w), equal_power(link, len(w))) for link in problem.links
+    )
     off = [1 + 1e-15 * noise.standard_normal(s.A.shape) for s in sums]
     others = tuple(replace(s, A=s.A * each) for s, each in zip(sums, off, strict=True))
     flights = [optimize_trajectory(problem, each, start) for each in (sums, others)]
     assert flights[0].w.tobytes() == flights[1].w.tobytes()
 
-    link, w = problem.bs_uav, start.w
+    link = problem.bs_uav
     H = link.channel(w)
     P = equal_power(link, len(w))
     channels = (H, H * (1 + 1e-15 * noise.standard_normal(H.shape)))
@@ -225,16 +215,15 @@ def test_rounding_errors_do_not_change_a_digit(paper_plan: MakePlan) -> None:
 
 
 def test_35_reaches_the_closed_form_for_bpsk_and_two_antennas(paper_plan: MakePlan) -> None:
-    problem = build_problem(paper_plan({"flight.time_step": 1}))
+    problem = build_problem(paper_plan(COARSE))
     w = straight_flight(problem.kinematics).w
     for link in problem.links:
-        H_r = link.small_scale(w)
-        H = link.channel(w, H_r)
+        H = link.channel(w)
         start = equal_power(link, len(w))
         P = optimize_precoders(link, H, start)
         assert (np.sum(np.abs(P) ** 2, axis=(1, 2)) <= link.power * (1 + 1e-9)).all()
         best = bpsk_two_antennas_rate(H, link.power, link.noise)
-        rates = link.mean_rates(link.channel(w, H_r), P)
+        rates = link.mean_rates(H, P)
         assert (rates <= best + 1e-9).all()
         assert rates.mean() == pytest.approx(best.mean(), abs=1e-3)
-        assert link.mean_rates(link.channel(w, H_r), start).mean() < best.mean() - 0.05
+        assert link.mean_rates(H, start).mean() < best.mean() - 0.05

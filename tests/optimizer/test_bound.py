@@ -10,7 +10,7 @@ import pytest
 from conftest import MISSIONS, MakePlan
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_flights import random_flight
+from random_flights import random_flight, with_maps
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
@@ -36,10 +36,6 @@ FREE = {
     "flight.bound_first_acceleration": False,
 }
 QUEUE = {"radio.causal": True}
-LAWS: dict[str, dict[str, Any]] = {
-    "least overhead": {"elevation_db": [0, 0, -40]},
-    "steep": {"exponent": 2.4, "elevation_db": [-8, 12]},
-}
 BY_THE_AXIS: dict[str, dict[str, Any]] = {
     "R_avg": {},
     "delivered": QUEUE,
@@ -52,13 +48,18 @@ BY_THE_AXIS: dict[str, dict[str, Any]] = {
         "vehicle.max_speed": 40,
         "vehicle.max_acceleration": 3,
     },
-    **{name: {"radio.gain": law} for name, law in LAWS.items()},
+    "least overhead": {"radio.gain": {"elevation_db": [0, 0, -40]}},
+    "steep": {"radio.gain": {"exponent": 2.4, "elevation_db": [-8, 12]}},
 }
 KINDS: dict[str, dict[str, Any]] = BY_THE_AXIS | {
     "half duplex": QUEUE | {"radio.duplex": "half"},
     "unknown fading": {"radio.fading": "ergodic", "radio.fading_samples": 3},
     "buffer": QUEUE | {"radio.bandwidth_mhz": 1, "radio.relay.buffer_mbytes": 0.2},
     "fence": QUEUE | WALL,
+    "wind": QUEUE | {
+        "vehicle.max_speed": 8, "site.wind": {"speed": 6, "from": 250}, "flight.duration": 20,
+    },
+    "maps": QUEUE | {"radio.duplex": "half"},
     "moving": {
         "radio.causal": True, "radio.duplex": "half",
         "radio.base_station.velocity": [4, -3], "radio.ground_user.velocity": [-6, 2],
@@ -76,11 +77,12 @@ class Bounded:
     """A problem, the cells of its bound by the axis, and its bounds in coarse cells."""
 
     plan: Plan
-    by_axis: bool
+    kind: str
 
     @cached_property
     def problem(self) -> Problem:
-        return build_problem(self.plan)
+        problem = build_problem(self.plan)
+        return with_maps(problem, 0) if self.kind == "maps" else problem
 
     @cached_property
     def best(self) -> BestRates:
@@ -98,7 +100,17 @@ class Bounded:
     def bounds(self) -> list[float]:
         fenced = self.problem.free_area is not None
         found = [map_bound(self.problem, self.best, cells=2000 if fenced else 300)]
-        return found + ([self.axis.bound([0.4, 0.5, 0.6])] if self.by_axis else [])
+        return found + ([self.axis.bound([0.4, 0.5, 0.6])] if self.kind in BY_THE_AXIS else [])
+
+    @cached_property
+    def reached(self) -> float:
+        """What the optimised flight reaches, which keeps its limits."""
+        solution = optimize(self.plan)
+        assert solution.converged
+        assert solution.is_feasible(1e-6)
+        airspeed = np.linalg.norm(solution.v - self.plan.wind, axis=1)
+        assert airspeed.max() <= self.plan.max_airspeed * (1 + 1e-8)
+        return self.value(solution.w)
 
     def value(self, w: Real) -> float:
         """What the best precoders make of the positions w (n, 2): the rate that is maximised."""
@@ -109,15 +121,12 @@ class Bounded:
 @pytest.fixture(scope="module")
 def bounded(small_plan: MakePlan) -> Callable[[str], Bounded]:
     faint = {"radio.base_station.power_dbm": 3, "radio.fading": "none"}
-    kinds = {
-        kind: Bounded(small_plan(faint | changes), kind in BY_THE_AXIS)
-        for kind, changes in KINDS.items()
-    }
+    kinds = {kind: Bounded(small_plan(faint | changes), kind) for kind, changes in KINDS.items()}
     return kinds.__getitem__
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=25)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**31))
 def test_no_flight_is_above_the_bounds(
     bounded: Callable[[str], Bounded], kind: str, seed: int
@@ -126,15 +135,8 @@ def test_no_flight_is_above_the_bounds(
     flight, free = random_flight(one.problem.kinematics, seed), one.problem.free_area
     if free is None or free.clearance(flight.w) >= 0:
         assert one.value(flight.w) <= min(one.bounds)
-
-
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "fence"])
-def test_no_optimised_flight_is_above_the_bounds(
-    bounded: Callable[[str], Bounded], kind: str
-) -> None:
-    one = bounded(kind)
-    reached = one.value(optimize(one.plan).w)
-    assert reached <= min(one.bounds) <= 1.6 * reached
+    if kind not in ("fence", "maps"):
+        assert one.reached <= min(one.bounds) <= 1.6 * one.reached
 
 
 def test_a_zone_over_a_station_lowers_the_bound(bounded: Callable[[str], Bounded]) -> None:
@@ -146,7 +148,7 @@ def test_a_zone_over_a_station_lowers_the_bound(bounded: Callable[[str], Bounded
 
 
 @pytest.mark.parametrize("kind", ["R_avg", "free ends", "fast"])
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(seed=st.integers(0, 2**31))
 def test_every_step_of_a_flight_is_in_reach_along_the_axis(
     bounded: Callable[[str], Bounded], kind: str, seed: int
@@ -183,7 +185,7 @@ def test_flights_may_have_few_instants(
         monkeypatch.setattr("faao_mav.optimizer.search.axis_bound._MOST_INSTANTS", instants)
         cells = AxisBound(one.problem, one.best, 6, 4)
         assert len(cells.times[0]) == instants
-        for seed in range(5):
+        for seed in range(3):
             assert one.value(random_flight(one.problem.kinematics, seed).w) <= cells.bound([0.5])
 
 
@@ -240,8 +242,7 @@ def test_several_prices_part_flights_that_never_meet(small_plan: MakePlan, causa
     ("changes", "exact"),
     [
         ({"radio.line_of_sight": "all_ones"}, True),
-        ({"radio.fading": "ergodic", "radio.fading_samples": 8}, False),
-        ({"radio.base_station.antennas": 1, "radio.relay.antennas": 1}, True),
+        ({"radio.fading": "ergodic", "radio.fading_samples": 4}, False),
     ],
 )
 def test_a_known_plan_tightens_it_and_stays_below(
@@ -267,17 +268,16 @@ def test_samples_are_close_to_their_bounds() -> None:
     assert reached < cells.bound([0.4, 0.45, 0.5, 0.55, 0.6]) < 1.03 * reached
 
 
-@pytest.mark.parametrize("line_of_sight", ["ula", "all_ones"])
-def test_best_rates_are_those_of_the_channel_or_above(
-    small_plan: MakePlan, line_of_sight: str
-) -> None:
-    problem = build_problem(small_plan(FAINT | {"radio.line_of_sight": line_of_sight}))
-    link = problem.uav_user
-    w = link.gains.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
-    values, exact = best_at(problem, link, link.gains.log(w.T)[:, None])
-    H = link.channel(w)
-    true = link.draw_rates(H, link.best(H[:, None]))
-    assert exact
-    assert (values[:, 0] >= true - 1e-6).all()
-    if line_of_sight == "all_ones":
-        assert values[:, 0] == pytest.approx(true, abs=1e-6)
+def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> None:
+    alone = {"radio.base_station.antennas": 1, "radio.relay.antennas": 1}
+    for changes in ({}, {"radio.line_of_sight": "all_ones"}, alone):
+        problem = build_problem(small_plan(FAINT | changes))
+        link = problem.uav_user
+        w = link.gains.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
+        values, exact = best_at(problem, link, link.gains.log(w.T)[:, None])
+        H = link.channel(w)
+        true = link.draw_rates(H, link.best(H[:, None]))
+        assert exact
+        assert (values[:, 0] >= true - 1e-6).all()
+        if "radio.line_of_sight" in changes:
+            assert values[:, 0] == pytest.approx(true, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Goals: the least duration, power and energy, and the most data, are those of trying all."""
+"""Goals and heights: the least duration, power and energy, the most data, the best height."""
 
 import math
 from contextlib import suppress
@@ -10,17 +10,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from random_flights import random_flight
+from test_power import TABLE
 
-from faao_mav.errors import InfeasibleError
+from faao_mav.errors import InfeasibleError, PlanError
 from faao_mav.optimizer import goal as goal_module
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.goal import least_number
 from faao_mav.optimizer.kinematics import Trajectory
-from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.optimize import best_height, optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.fields import dbm
+from faao_mav.plan.keys import ALIASES, POWER
+from faao_mav.plan.yaml_text import load_yaml
+from faao_mav.power import FixedWing
 from faao_mav.report.summary import result_lines
 from faao_mav.workflow import Result
 
@@ -42,30 +46,23 @@ def delivered(changes: dict[str, Any]) -> float:
     return direct(build_problem(BASE.changed(changes))).delivered_rate
 
 
-@pytest.fixture(scope="module")
-def by_duration() -> dict[int, float]:
-    """What flights of every duration deliver, bit/s/Hz."""
-    return {slots: delivered({"flight.duration": slots}) for slots in range(12, 19)}
-
-
-@pytest.mark.parametrize(("amount", "share"), [("rate", 0.0), ("deliver_mbytes", 0.3)])
-def test_the_least_duration_is_that_of_trying_all(
-    by_duration: dict[int, float], amount: str, share: float
-) -> None:
-    per_slot = {n: 1.0 if amount == "rate" else 10 * n / 8 for n in by_duration}
-    amounts = {n: rate * per_slot[n] for n, rate in by_duration.items()}
-    low, high = min(amounts.values()), max(amounts.values())
-    asked = low + share * (high - low) - 1e-3  # ends differ by the tolerance
-    found = optimize(BASE.changed({"goal": {amount: asked, "minimise": "duration"}}))
-    least = min(n for n, reached in amounts.items() if reached >= asked)
-    assert found.plan.flight.duration == least
-    assert found.least is not None
-    assert found.least.optimizations <= 9
-    if least == min(amounts):
-        assert found.least.below is None
-    else:
-        assert found.least.below is not None
-        assert found.least.below.delivered_rate < found.least.below.plan.needed_rate
+def test_the_least_duration_is_that_of_trying_all() -> None:
+    by_duration = {slots: delivered({"flight.duration": slots}) for slots in range(12, 19)}
+    for amount, share in (("rate", 0.0), ("deliver_mbytes", 0.3)):
+        per_slot = {n: 1.0 if amount == "rate" else 10 * n / 8 for n in by_duration}
+        amounts = {n: rate * per_slot[n] for n, rate in by_duration.items()}
+        low, high = min(amounts.values()), max(amounts.values())
+        asked = low + share * (high - low) - 1e-3  # ends differ by the tolerance
+        found = optimize(BASE.changed({"goal": {amount: asked, "minimise": "duration"}}))
+        least = min(n for n, reached in amounts.items() if reached >= asked)
+        assert found.plan.flight.duration == least
+        assert found.least is not None
+        assert found.least.optimizations <= 9
+        if least == min(amounts):
+            assert found.least.below is None
+        else:
+            assert found.least.below is not None
+            assert found.least.below.delivered_rate < found.least.below.plan.needed_rate
 
 
 def test_the_least_power_is_just_enough() -> None:
@@ -108,24 +105,22 @@ def test_the_least_number_is_that_of_trying_all(
         assert least_number(surplus.__getitem__, 0, high, -1.0, surplus[high]) == least
 
 
-@pytest.mark.parametrize(
-    ("goal", "told"),
-    [
-        ({"rate": 9.0, "minimise": "duration"},
-         "goal.rate: 9 bit/s/Hz cannot be delivered in 18 s (flight.duration) at 1 and 20 dBm"),
-        ({"deliver_mbytes": 900, "minimise": "power"}, "at most "),
-    ],
-)  # fmt: skip
-def test_a_goal_out_of_reach_says_what_is_possible(goal: dict[str, Any], told: str) -> None:
-    with pytest.raises(InfeasibleError) as caught:
-        optimize(BASE.changed({"goal": goal}))
-    assert told in str(caught.value)
-    assert f"at most {_most(BASE, 'rate' in goal)}" in str(caught.value)
-
-
-def _most(plan: Plan, rate: bool) -> str:
-    R_del = direct(build_problem(plan)).delivered_rate
-    return f"{R_del:.4f} bit/s/Hz" if rate else f"{plan.megabytes(R_del):.4g} megabytes"
+def test_a_goal_out_of_reach_says_what_is_possible() -> None:
+    most = delivered({})
+    for goal, *told in (
+        (
+            {"rate": 9.0, "minimise": "duration"},
+            "goal.rate: 9 bit/s/Hz cannot be delivered in 18 s (flight.duration) at 1 and 20 dBm",
+            f"at most {most:.4f} bit/s/Hz",
+        ),
+        (
+            {"deliver_mbytes": 900, "minimise": "power"},
+            f"at most {BASE.megabytes(most):.4g} megabytes",
+        ),
+    ):
+        with pytest.raises(InfeasibleError) as caught:
+            optimize(BASE.changed({"goal": goal}))
+        assert all(part in str(caught.value) for part in told)
 
 
 COPTER = parse_plan("""
@@ -140,45 +135,32 @@ radio:
   ground_user: {position: [80, 60], noise_dbm: -80}
 optimizer: {starts: [bs-user], max_iterations: 25}
 """)
-PLANE = COPTER.changed(
-    {
-        "vehicle": {
-            "type": "plane",
-            "min_speed": 9,
-            "max_speed": 16,
-            "max_acceleration": 5,
-            "power": {"cruise_w": 90, "at": 12, "mass": 2.5},
-        },
-        "flight.start_velocity": "free",
-        "flight.end_velocity": "free",
-    },
-)
+WING = """{type: plane, min_speed: 9, max_speed: 16, max_acceleration: 5,
+           power: {cruise_w: 90, at: 12, mass: 2.5}}"""
+PLANE = COPTER.changed({
+    "vehicle": load_yaml(WING, "plane"),
+    "flight.start_velocity": "free",
+    "flight.end_velocity": "free",
+})  # fmt: skip
 
 
 def integrated(plan: Plan, flight: Trajectory) -> float:
-    """What a flight takes, J, by the formulas of the papers."""
-    v, a, g = flight.v - np.array(plan.wind), flight.a, 9.80665
-    s = np.hypot(*v.T)
-    if plan.vehicle.type == "copter":
-        swept = 1.225 * 0.503
-        r = s**2 / (20 / swept)
-        power = 0.012 / 8 * swept * 0.05 * 120**3 * (1 + 3 * s**2 / 120**2)
-        power += 1.1 * 20**1.5 / math.sqrt(2 * swept) * np.sqrt(np.sqrt(1 + r**2) - r)
-        power += 0.6 * 0.05 * swept * s**3 / 2
-    else:
-        along, across = (a * v).sum(axis=1), a[:, 0] * v[:, 1] - a[:, 1] * v[:, 0]
-        power = 90 / (2 * 12**3) * s**3 + 90 * 12 / 2 / s * (1 + (across / s / g) ** 2)
-        power += 2.5 * np.maximum(0.0, along)
-    return plan.flight.time_step * float((power + plan.radio.relay.power).sum())
+    """What a flight takes, J, by the formulas of `test_power.py`, and the relay's transmitter."""
+    model = FixedWing.fitted(90.0, 12.0, 2.5) if plan.vehicle.type == "plane" else TABLE
+    through, a = (
+        np.column_stack([x, np.zeros(len(x))]) for x in (flight.v - np.array(plan.wind), flight.a)
+    )
+    power = sum(float(model(*each)) for each in zip(through, a, strict=True))
+    return plan.flight.time_step * (power + len(a) * plan.radio.relay.power)
 
 
-@pytest.mark.parametrize(("plan", "wind"), [(COPTER, 5), (PLANE, 0)])
-def test_the_energy_is_that_of_direct_integration(plan: Plan, wind: float) -> None:
-    plan = plan.changed({"site.wind": {"speed": wind, "from": 250}})
-    problem = build_problem(plan)
-    for seed in range(3):
-        flight = random_flight(problem.kinematics, seed)
-        assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
+def test_the_energy_is_that_of_direct_integration() -> None:
+    for still, wind in ((COPTER, 5), (PLANE, 0)):
+        plan = still.changed({"site.wind": {"speed": wind, "from": 250}})
+        problem = build_problem(plan)
+        for seed in range(3):
+            flight = random_flight(problem.kinematics, seed)
+            assert problem.energy_of(flight) == pytest.approx(integrated(plan, flight), rel=1e-9)
 
 
 def within(energy_wh: float) -> Solution:
@@ -264,3 +246,92 @@ def test_too_little_energy_says_what_the_straight_flight_takes() -> None:
         InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
     ):
         within(0.2)
+
+
+HOVER = """
+site: {origin: {latitude: -35.36, longitude: 149.17, elevation: 584}}
+vehicle: {max_speed: 1, max_acceleration: 1}
+flight: {start: [100, 0], end: [100, 0], altitude: {least: 20, most: 120}, duration: 4,
+         time_step: 1}
+radio:
+  fading: none
+  base_station: {position: [0, 0], power_dbm: -20}
+  relay: {power_dbm: -20}
+  ground_user: {position: [0, 0]}
+"""
+"""A hover 100 m from both stations, which are at one place."""
+
+
+def hovering(changes: dict[str, Any] | None = None) -> Plan:
+    """Return the hover, with `changes` by dotted keys."""
+    return parse_plan(HOVER).changed(changes or {})
+
+
+def test_the_best_height_is_that_of_the_closed_form() -> None:
+    """20 log10(cos e) + c sin(e) is highest where c (1 - s^2) = 20 s / ln 10, s = sin(e)."""
+    c = 16.0
+    k = 20 / (math.log(10) * c)
+    s = (math.sqrt(k * k + 4) - k) / 2
+    found = optimize(hovering({"radio.gain.elevation_db": [c]}))
+    assert found.plan.flight.altitude == pytest.approx(100 * s / math.sqrt(1 - s * s), abs=0.5)
+
+
+def test_the_better_of_two_local_optima_is_found() -> None:
+    def peaks(candidate: Plan, known: Trajectory | None) -> Solution:
+        asked.append(known is not None)
+        height = candidate.flight.altitude
+        power = max(-abs(height - 35), 15 - abs(height - 93.4))
+        return optimize(candidate.changed(dict.fromkeys(ALIASES[POWER], power)))
+
+    asked: list[bool] = []
+    found = best_height(hovering(), peaks)
+    assert found.plan.flight.altitude == pytest.approx(93.4, abs=0.5)
+    assert asked == [False, *[True] * (len(asked) - 1)]  # each begins with a flight nearby
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three heights and none between, where that is enough."""
+    monkeypatch.setattr("faao_mav.optimizer.optimize._EVENLY", 3)
+    monkeypatch.setattr("faao_mav.optimizer.optimize._REFINED", 0)
+
+
+@pytest.mark.usefixtures("few")
+def test_the_ceiling_of_the_vehicles_fence_counts() -> None:
+    """Where the highest is the best; without terms over the elevation it is the lowest."""
+    for autopilot, parameters, expected in (
+        ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_TYPE": 9, "FENCE_ALT_MAX": 60}, 60.0),
+        ("ardupilot", {"FENCE_ENABLE": 0, "FENCE_ALT_MAX": 60}, 120.0),
+        ("px4", {"GF_MAX_VER_DIST": 50.5}, 50.5),
+    ):
+        changes = {"vehicle.autopilot": autopilot, "vehicle.parameters": parameters}
+        found = optimize(hovering({**changes, "radio.gain.elevation_db": [60]}))
+        assert found.plan.flight.altitude == expected
+    lowest = optimize(hovering())
+    assert lowest.plan.flight.altitude == 20.0
+    assert lowest.height is not None
+    assert lowest.height.at_most is not None
+    assert lowest.height.at_most.delivered_rate < lowest.delivered_rate
+
+    with pytest.raises(PlanError, match=r"flight\.altitude: 20 to 120 m.*-inf to 15 m"):
+        optimize(hovering({"vehicle.autopilot": "px4", "vehicle.parameters.GF_MAX_VER_DIST": 15}))
+
+
+@pytest.mark.usefixtures("few")
+def test_a_goal_is_met_at_the_height_where_it_takes_least() -> None:
+    """Where gains are 3 dB higher, so much less power does."""
+    asked = {"goal": {"minimise": "power", "rate": 0.5}, "radio.gain.elevation_db": [12]}
+    found = optimize(hovering({**asked, **dict.fromkeys(ALIASES[POWER], 20)}))
+    assert found.height is not None
+    assert found.height.at_least is not None
+    both = found, found.height.at_least
+    powers = [each.plan.powers[0] for each in both]
+    gains = [each.problem.bs_uav.gains.gain(each.w.T).mean() for each in both]
+    assert powers[1] / powers[0] == pytest.approx(gains[0] / gains[1], rel=0.01)
+    assert gains[0] > 1.5 * gains[1]
+
+
+def test_other_heights_are_refused() -> None:
+    for height in ({"least": 20}, {"least": 60, "most": 40}, {"least": 0, "most": 40}, "high"):
+        with pytest.raises(PlanError, match=r"flight\.altitude: .*\{least: metres, most: metre"):
+            hovering({"flight.altitude": height})

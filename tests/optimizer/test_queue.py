@@ -1,4 +1,4 @@
-"""What a relay delivers, maximised: against convex programs, KKT conditions and known optima."""
+"""What is maximised: what a relay delivers, and the mutual information; beside known optima."""
 
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,13 @@ from faao_mav.errors import InputError
 from faao_mav.optimizer.interior.maximize import maximize, objective
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
+from faao_mav.optimizer.pricing import fresh_rates, price, saturation
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.scaled import flight_variables, minimize
+from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import load_solution, save_solution
-from faao_mav.plan import read_plan
+from faao_mav.plan import Plan, read_plan
 from faao_mav.radio.relay import RelayQueue
 
 SLOW = plane(20, min_speed=12.0, max_speed=25.0, start=np.array([0.0, 100.0]))
@@ -63,10 +65,7 @@ def test_the_global_optimum_of_concave_rates() -> None:
 
 @pytest.mark.parametrize(
     ("kin", "relay"),
-    [
-        (copter(70, time_step=0.5), RelayQueue(half=True, buffer=20.0)),
-        (SLOW, RelayQueue(half=True)),
-    ],
+    [(copter(70), RelayQueue(half=True, buffer=20.0)), (SLOW, RelayQueue(half=True))],
 )
 def test_a_local_optimum_of_what_is_delivered(kin: Kinematics, relay: RelayQueue) -> None:
     start = straight_flight(kin)
@@ -98,14 +97,12 @@ def test_small_buffers_converge(duplex: str, buffer: int) -> None:
     assert still_gained(solution) < 1e-4
 
 
-def test_a_buffer_of_megabytes_is_one_of_bits_per_hertz(small_plan: MakePlan) -> None:
-    plan = small_plan({"radio.bandwidth_mhz": 2, "radio.relay.buffer_mbytes": 1})
-    assert build_problem(plan).relay.buffer == 4.0
-
-
 def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None:
     path = tmp_path / "result.npz"
-    solution = optimize(small_plan({"radio.causal": True, "radio.duplex": "half"}))
+    megabyte = {"radio.bandwidth_mhz": 2, "radio.relay.buffer_mbytes": 1}
+    half = {"radio.causal": True, "radio.duplex": "half", "radio.fading": "none"}
+    solution = optimize(small_plan(half | megabyte))
+    assert solution.problem.relay.buffer == 4.0  # bits per hertz
     save_solution(solution, path)
     loaded = load_solution(path)
     assert solution.shares is not None
@@ -117,3 +114,69 @@ def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None
         np.savez(tmp_path / "other.npz", **{**archive, "shares": archive["shares"] + 0.5})
     with pytest.raises(InputError, match=r"shares: expected a number of 0 to 1"):
         load_solution(tmp_path / "other.npz")
+
+
+FOR_IT = {"optimizer.rate": "mutual_information", "radio.modulation": "qpsk", "power": 5}
+BPSK = {"radio.modulation": "bpsk", "power": 0}
+
+
+def plan_of(small_plan: MakePlan, changes: dict[str, Any]) -> Plan:
+    """The small plan for the mutual information of QPSK, at a power where it matters."""
+    wanted = FOR_IT | {"optimizer.starts": ["straight"]} | changes
+    power = wanted.pop("power")
+    powers = {"radio.base_station.power_dbm": power, "radio.relay.power_dbm": power}
+    return small_plan(powers | wanted)
+
+
+def test_it_is_never_below_the_plan_for_the_cutoff_rate(small_plan: MakePlan) -> None:
+    gaussian = optimize(
+        plan_of(small_plan, {"radio.fading": "none", "optimizer.inputs": "gaussian"})
+    )
+    assert gaussian.history[-1] == pytest.approx(gaussian.rates.R_avg, abs=1e-12)
+    assert gaussian.gain is None
+    half = {"radio.fading": "none", "radio.causal": True, "radio.duplex": "half"}
+    plan = plan_of(small_plan, BPSK | half)
+    solution = optimize(plan)
+    assert solution.is_feasible()
+    assert solution.history[-1] == pytest.approx(solution.delivered_rate, abs=1e-12)
+    assert solution.gain is not None
+    assert solution.gain > -1e-4
+    before = optimize(plan.changed({"optimizer.rate": "cutoff"}))
+    assert before.gain is None
+    assert solution.rates.R_avg > before.rates.R_avg  # of the same flight it would be above too
+    problem = build_problem(plan)
+    rates = [
+        link.mean_rates(link.channel(before.w, H_r), P)
+        for link, H_r, P in zip(
+            problem.links, (before.H_rB, before.H_rU), (before.P_B, before.P_U), strict=True
+        )
+    ]
+    reached = before.relay(*rates).rate
+    assert solution.delivered_rate - solution.gain == pytest.approx(reached, abs=1e-9)
+
+
+@pytest.mark.usefixtures("coarse_map")
+def test_its_rates_are_those_that_sampling_finds(small_plan: MakePlan, tmp_path: Path) -> None:
+    """Two ways to average over the noise, and one answer; more than the plan for cutoff rates."""
+    drawn = {"radio.fading_samples": 8, "radio.causal": True}
+    planned = optimize(plan_of(small_plan, BPSK | drawn))
+    information = price(planned)
+    assert planned.rates.R_avg == pytest.approx(information.average, abs=0.02)
+    assert planned.delivered_rate == pytest.approx(information.delivered, abs=0.02)
+    assert information.delivered <= information.average + 1e-9
+    assert planned.gain is not None
+    assert planned.gain > 0.005
+    assert planned.converged
+    assert still_gained(planned) < 2e-4
+    fresh = fresh_rates(planned)
+    assert fresh is not None
+    assert fresh.delivered == pytest.approx(planned.delivered_rate, abs=0.3)
+    assert fresh.delivered_error < 0.1
+    assert not saturation(planned).saturated
+    bound = upper_bound(planned.problem, planned.rates.R_avg)
+    assert planned.rates.R_avg <= bound.value < 1.1 * planned.rates.R_avg
+    assert not bound.exact
+    save_solution(planned, tmp_path / "result.npz")
+    loaded = load_solution(tmp_path / "result.npz")
+    assert loaded.gain == planned.gain
+    assert loaded.recomputed() == planned.rates

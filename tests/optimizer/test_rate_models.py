@@ -22,11 +22,8 @@ def gradient_by_differences(f: Callable[[Real], Real], w: Real, h: float = 0.02)
     return np.stack([(f(w + h * e) - f(w - h * e)) / (2 * h) for e in np.eye(2)], axis=1)
 
 
-def hessian_by_differences(f: Callable[[Real], Real], w: Real, h: float = 0.05) -> Real:
-    def slope(along: Real) -> Real:
-        return gradient_by_differences(f, w + along)
-
-    return np.stack([(slope(h * e) - slope(-h * e)) / (2 * h) for e in np.eye(2)], axis=1)
+def hessian_by_differences(f: Callable[[Real], Real], w: Real) -> Real:
+    return gradient_by_differences(lambda at: gradient_by_differences(f, at), w, 0.05)
 
 
 def places(link: Link, seed: int = 3) -> Real:
@@ -56,11 +53,10 @@ def differs(link: Link, rate: RateModel, w: Real, *, curvature: float = 1e-2) ->
     assert hessian == pytest.approx(hessian_by_differences(value, w), rel=curvature, abs=1e-4)
 
 
-@pytest.mark.parametrize("hop", [0, 1])
-def test_the_envelope_theorem(small_plan: MakePlan, hop: int) -> None:
+def test_the_envelope_theorem(small_plan: MakePlan) -> None:
     """At the best precoders: the exact slope, and a curvature that is never too high."""
     plan = small_plan({"radio.fading": "realization"})
-    link = build_problem(plan).links[hop]
+    link = build_problem(plan).bs_uav
     w, rate = places(link), SlotRate(link, design(plan))
     best = value_of(link, rate)
     gradient, hessian = derivatives(link, rate, w)
@@ -94,7 +90,7 @@ FADINGS: dict[str, dict[str, Any]] = {
     ("kind", "fading"),
     [
         *(("best", fading) for fading in FADINGS),
-        *(("zf", fading) for fading in FADINGS),
+        *(("zf", fading) for fading in ("known", "statistical")),
         ("gaussian", "instantaneous"),
         ("mrt, gaussian", "statistical"),
         ("another law", "known"),
@@ -124,14 +120,8 @@ def test_models_have_the_rate_of_every_place_and_its_slopes(
 
 def test_tables_of_mutual_information(small_plan: MakePlan) -> None:
     """The curves are smooth, and nowhere above what precoders of the place itself carry."""
-    plan = small_plan(
-        {
-            "optimizer.rate": "mutual_information",
-            "radio.fading": "ergodic",
-            "radio.fading_samples": 2,
-            "radio.line_of_sight": "all_ones",
-        }
-    )
+    for_it = {"optimizer.rate": "mutual_information", "radio.line_of_sight": "all_ones"}
+    plan = small_plan(for_it | {"radio.fading_samples": 2})
     wanted, link = design(plan), build_problem(plan).bs_uav
     rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
     assert isinstance(rate, TableRate)

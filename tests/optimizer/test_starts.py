@@ -1,5 +1,6 @@
 """The feasible set, and flights to start from: straight, and by way of the stations."""
 
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -19,53 +20,38 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.starts import COARSE_SLOTS, block_stage, improve_starts, starts
-from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.plan import read_plan
+from faao_mav.optimizer.search.straight import even_speed, straight_flight
+from faao_mav.plan import Wind, read_plan
 
 STATIONS = {"bs": np.array([0.0, 0.0]), "user": np.array([300.0, 300.0])}
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
 
 
-def kin(seconds: float, **changes: Any) -> Kinematics:
-    return copter(seconds, time_step=0.5, **changes)
-
-
-def test_every_start_can_be_flown() -> None:
+def test_every_start_can_be_flown_and_visits_the_stations_in_order() -> None:
     for seconds in (68.0, 75.0, 300.0):
-        k = kin(seconds, start_velocity=None, end_velocity=None)
+        k = copter(seconds, start_velocity=None, end_velocity=None)
         found = starts(k, NAMES, STATIONS)
         assert "straight" in found
         for flight in found.values():
             assert max(k.residuals(flight).values()) < 1e-9
-
-
-def test_with_time_the_stations_are_visited_in_order_and_hovered_at() -> None:
-    found = starts(kin(300), NAMES, STATIONS)
     assert list(found) == NAMES
-    at = {
-        name: [np.linalg.norm(found[name].w - p, axis=1).argmin() for p in STATIONS.values()]
-        for name in ("bs-user", "user-bs")
-    }
-    assert at["bs-user"][0] < at["bs-user"][1]
-    assert at["user-bs"][0] > at["user-bs"][1]
-    for p in STATIONS.values():
-        near = np.linalg.norm(found["bs-user"].w - p, axis=1) < 1e-6
-        assert near.sum() > 20
+    for name, sign in (("bs-user", 1), ("user-bs", -1)):
+        away = [np.linalg.norm(found[name].w - p, axis=1) for p in STATIONS.values()]
+        assert np.sign(away[1].argmin() - away[0].argmin()) == sign
+        assert all(np.count_nonzero(each < 1e-6) > 20 for each in away)  # it hovers there
 
 
 def test_with_less_time_it_goes_as_far_as_it_can() -> None:
     shares = []
     for seconds in (75.0, 80.0, 90.0, 120.0):  # a stop on the way alone takes 5 s
-        flight = starts(kin(seconds), ["bs"], STATIONS)["bs"]
+        flight = starts(copter(seconds), ["bs"], STATIONS)["bs"]
         shares.append(np.linalg.norm(flight.w - STATIONS["bs"], axis=1).min())
     assert shares == sorted(shares, reverse=True)
     assert shares[0] > 100
     assert shares[-1] < 1e-6
-
-
-def test_what_cannot_be_had_is_left_out() -> None:
-    assert list(starts(kin(68.0), ["bs", "user"], STATIONS)) == ["straight"]
-    across = kin(300, start_velocity=np.array([1.0, 1.0]))
+    # what cannot be had is left out
+    assert list(starts(copter(68.0), ["bs", "user"], STATIONS)) == ["straight"]
+    across = copter(300, start_velocity=np.array([1.0, 1.0]))
     assert list(starts(across, ["bs"], STATIONS)) == ["straight"]
 
 
@@ -115,31 +101,26 @@ def test_of_equal_flights_the_first_is_best_whatever_rounding_says(small_plan: M
 
 def make(**changes: Any) -> Kinematics:
     values = {"start": np.array([0.0, 50.0]), "end": np.array([50.0, 0.0]), "slots": 21}
-    return kin(0, **(values | {"max_speed": 20.0, "max_acceleration": 5.0} | changes))
+    return copter(0, **(values | {"max_speed": 20.0, "max_acceleration": 5.0} | changes))
 
 
 ENDS = [(None, None), ([0, 0], None), ([3, -3], [5, -5]), ([0, 6], [4, 1]), ([-5, 5], None)]
 
 
-@pytest.mark.parametrize(("first", "last"), ENDS)
-def test_the_start_is_feasible(first: Any, last: Any) -> None:
-    ends = [None if v is None else np.array(v, dtype=float) for v in (first, last)]
-    for bounded, end in product((True, False), ([50.0, 0.0], [0.0, 50.0])):
+def test_the_straight_start_is_feasible_and_from_hover_to_hover_even() -> None:
+    for ends, bounded, end in product(ENDS, (True, False), ([50.0, 0.0], [0.0, 50.0])):
+        first, last = (None if v is None else np.array(v, dtype=float) for v in ends)
         kin = make(
-            start_velocity=ends[0],
-            end_velocity=ends[1],
+            start_velocity=first,
+            end_velocity=last,
             bound_first_acceleration=bounded,
             end=np.array(end),
         )
         flight = straight_flight(kin)
         assert flight.w.shape == flight.v.shape == flight.a.shape == (21, 2)
         assert worst(kin, flight) < 1e-7
-    kin = make(start_velocity=np.array([20.0, 0.0]), slots=5)
     with pytest.raises(InfeasibleError, match="end velocities"):
-        straight_flight(kin)
-
-
-def test_hover_to_hover_is_straight_and_even() -> None:
+        straight_flight(make(start_velocity=np.array([20.0, 0.0]), slots=5))
     flight = straight_flight(make())
     assert flight.w @ np.array([1.0, 1.0]) == pytest.approx(50)
     speed = np.linalg.norm(flight.v, axis=1)
@@ -157,23 +138,53 @@ def test_plans_that_are_accepted_can_be_flown(
     duration = round(step * slots, 6)
     distance = share * 20 * duration
     kinds = [("hover", "hover"), ("hover", "free"), ("free", "hover")][ends]
+    flight = {
+        "time_step": step,
+        "duration": duration,
+        "start": [0, 0],
+        "end": [distance, 0],
+        "start_velocity": kinds[0],
+        "end_velocity": kinds[1],
+        "bound_first_acceleration": bounded,
+    }
     try:
-        plan = small_plan(
-            {
-                "flight.time_step": step,
-                "flight.duration": duration,
-                "flight.start": [0, 0],
-                "flight.end": [distance, 0],
-                "flight.start_velocity": kinds[0],
-                "flight.end_velocity": kinds[1],
-                "flight.bound_first_acceleration": bounded,
-            }
-        )
+        plan = small_plan({f"flight.{key}": value for key, value in flight.items()})
     except PlanError as error:
         assert "too short" in str(error)
         return
     kin = kinematics(plan)
     assert worst(kin, straight_flight(kin)) < 1e-6
+
+
+COPTER = make(
+    start=np.zeros(2),
+    end=np.array([100.0, 50.0]),
+    slots=81,
+    max_speed=8.0,
+    max_acceleration=2.0,
+    max_airspeed=9.0,
+)
+FREE = replace(COPTER, start_velocity=None, end_velocity=None)
+
+
+def test_starts_in_wind_keep_the_limits_or_there_is_none() -> None:
+    there = {"bs": np.zeros(2), "user": np.array([80.0, 90.0])}
+    for calm, (speed, degrees) in product(
+        (COPTER, FREE), ((3.0, 135.0), (7.0, 20.0), (8.9, 250.0))
+    ):
+        kin = replace(calm, wind=Wind(speed=speed, from_degrees=degrees).velocity)
+        try:
+            flights = starts(kin, ["straight", "bs", "user-bs"], there)
+        except InfeasibleError:
+            distance = float(np.hypot(*kin.end))
+            assert even_speed(kin, kin.end / distance, distance) is None
+        else:
+            for flight in flights.values():
+                assert worst(kin, flight) < 1e-7
+    windy = replace(FREE, wind=(4.0, -3.0), min_speed=3.0, max_speed=20.0)
+    flight = straight_flight(windy.in_the_air())
+    assert worst(windy.in_the_air(), flight) < 1e-9
+    assert worst(windy, windy.over_ground(flight)) < 1e-9
 
 
 def test_residuals_see_every_violation() -> None:

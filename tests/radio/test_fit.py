@@ -1,4 +1,4 @@
-"""The fit of a law to levels along flights: against laws that the tests draw fields about."""
+"""A law fitted to levels along flights about which fields are drawn; the map of what it leaves."""
 
 from dataclasses import replace
 
@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.radio.fit import LinkFit, Samples, fit_link
+from faao_mav.radio.kriging import kriged
+from faao_mav.radio.spline import Spline
 
 
 def flight(height: float, seed: int = 0, rows: int = 6) -> Samples:
@@ -80,15 +83,12 @@ def test_without_noise_the_law_itself_is_found(
     assert off(fit, gain) < 0.05
 
 
-def test_outliers_move_nothing() -> None:
+def test_outliers_move_nothing_and_what_is_not_finite_or_not_flown_is_left_out() -> None:
     gain = (-45.0, 2.0, 20.0)
     clean = levels([flight(50.0), flight(100.0, 1)], gain, 3.0, 30.0, 1)
     rare = [60.0 * (np.arange(len(each.t)) % 40 == 0) for each in clean]
     struck = [replace(each, level=each.level + x) for each, x in zip(clean, rare, strict=True)]
     assert off(fit_link(struck), gain) < off(fit_link(clean), gain) + 1.0
-
-
-def test_what_is_not_finite_or_not_flown_is_left_out() -> None:
     (sound,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
     gaps = sound.level.copy()
     gaps[5:20], gaps[40] = np.nan, np.inf
@@ -99,19 +99,25 @@ def test_what_is_not_finite_or_not_flown_is_left_out() -> None:
     assert off(fit, (-45.0, 2.0)) < 3.0
 
 
-def test_one_leg_gives_the_level_alone() -> None:
+def test_one_leg_gives_the_level_alone_and_no_flight_is_refused() -> None:
     one = flight(50.0, rows=1)
     fit = fit_link(levels([one], (-45.0, 2.0, 30.0, -20.0), 3.0, 30.0, 0))
     assert fit.legs == 1
     assert (fit.exponent, fit.elevation) == (2.0, ())
     assert fit.error == np.inf
+    (some,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
+    with pytest.raises(InputError, match="one place alone"):
+        fit_link([replace(some, place=0 * some.place + 40.0)])
+    some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
+    with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
+        fit_link([some])
 
 
 def test_no_elevation_spread_gives_no_terms_that_run_wild() -> None:
     """High above and far away the sine hardly changes: its terms would be anything elsewhere."""
     far = flight(30.0)
     far = replace(far, place=far.place + np.array([3000.0, 0.0, 0.0]))
-    for seed in range(3):
+    for seed in range(2):
         fit = fit_link(levels([far], (-45.0, 2.0), 3.0, 30.0, seed))
         s = np.linspace(0.0, 1.0, 50)
         swing = np.ptp(sum((c * s**k for k, c in enumerate(fit.elevation, 1)), 0.0 * s))
@@ -121,10 +127,49 @@ def test_no_elevation_spread_gives_no_terms_that_run_wild() -> None:
     assert 0.0 <= fit_link([steep]).exponent <= 10.0
 
 
-def test_no_flight_is_refused() -> None:
-    (some,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
-    with pytest.raises(InputError, match="one place alone"):
-        fit_link([replace(some, place=0 * some.place + 40.0)])
-    some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
-    with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
-        fit_link([some])
+SIDE = np.arange(-400.0, 401.0, 10.0)
+STATION = (47.0, 8.0, 5.0)
+
+
+def field(seed: int, spread: float) -> Spline:
+    """A smooth field of shadowing over the map, correlated over some 80 m."""
+    noise = np.random.default_rng(seed).standard_normal((len(SIDE), len(SIDE)))
+    smooth = gaussian_filter(noise, 5.0)
+    return Spline.through(SIDE, SIDE, spread * smooth / smooth.std())
+
+
+def legs(shadow: Spline, noise: float) -> Samples:
+    """Legs east and west, 40 m apart, 60 m above the antenna, past it and about it."""
+    t = np.arange(0.0, 600.0)
+    leg, along = np.divmod(10.0 * t, 600.0)
+    x = np.where(leg % 2 == 0, along - 300.0, 300.0 - along)
+    place = np.stack([x, 40.0 * leg - 200.0, np.full_like(t, 60.0)], axis=1)
+    level = -45.0 - 20 * np.log10(np.linalg.norm(place, axis=1)) + shadow.value(x, place[:, 1])
+    return Samples(t, place, level + noise * np.random.default_rng(9).standard_normal(len(t)))
+
+
+def apart(shadow: Spline, value: Real, x: Real, y: Real) -> float:
+    return float(np.sqrt(np.mean((shadow.value(x, y) - value) ** 2)))
+
+
+def test_a_field_between_the_legs_is_told_and_nothing_far_away() -> None:
+    shadow = field(1, 4.0)
+    fit = fit_link([legs(shadow, 1.0)], 1.0)
+    found, alone, error = kriged(fit, STATION)
+    assert found is not None
+    assert error < 0.8 * alone
+    x, y = np.meshgrid(np.linspace(-280, 280, 30), np.arange(-180.0, 180.0, 40.0))
+    law = fit.gain_db(np.stack([x, y, np.full_like(x, 60.0)], axis=-1))
+    true = -45.0 - 10 * np.log10(x**2 + y**2 + 60.0**2)
+    assert apart(shadow, found.at(60.0).value(x, y) + law - true, x, y) < 0.5 * 4.0
+    far = found.at(60.0).value(np.array([2000.0]), np.array([0.0]))
+    assert far == pytest.approx(0, abs=1e-9)
+    assert (found.origin, found.above_law) == ((47.0, 8.0), True)
+    assert found.heights[0] <= 60 <= found.heights[-1]
+
+
+def test_where_what_is_left_is_seen_once_there_is_no_map() -> None:
+    found, alone, error = kriged(fit_link([legs(field(4, 1e-9), 3.0)], 1.0), STATION)
+    assert error > 0.97 * alone
+    if found is not None:
+        assert np.abs(found.db).max() < 3.0

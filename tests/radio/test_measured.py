@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from faao_mav.errors import InputError
@@ -97,20 +97,15 @@ def test_other_tables_are_refused(tmp_path: Path, header: str, level: object, me
         read_measured(table(tmp_path, header, level), STATION)
 
 
-@pytest.mark.parametrize("content", [b"", b"\n\n", b"\xff\xfe\x00", b"time_s,lat,lon,alt_m,snr_db"])
-def test_files_that_are_no_table_are_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "levels.csv"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=r"levels\.csv"):
-        read_measured(path, STATION)
-
-
-@settings(max_examples=60)
 @given(st.text(alphabet='time_s,latonrspdbm(;\t"0123456789.-eNinf \n', max_size=300))
 def test_any_text_is_a_table_or_refused(
     tmp_path_factory: pytest.TempPathFactory, text: str
 ) -> None:
     path = tmp_path_factory.getbasetemp() / "any.csv"
+    for content in (b"", b"\n\n", b"\xff\xfe\x00", b"time_s,lat,lon,alt_m,snr_db"):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"any\.csv"):
+            read_measured(path, STATION)
     path.write_text(f"time_s,lat,lon,alt_m,rsrp_dbm\n{text}")
     try:
         found = read_measured(path, STATION)

@@ -97,8 +97,6 @@ def test_the_errors_give_the_slope() -> None:
     errors = np.zeros((1, 1, 2, 2), dtype=np.complex128)
     mutual_information(H, P, "qpsk", 0.75, errors=errors)
     gradient = 2 * (H.conj().mT @ H @ P @ errors).mean(axis=1) / (0.75 * np.log(2.0))
-    up, down = (
-        mutual_information(H, P + step, "qpsk", 0.75).mean() for step in (change, -change)
-    )
+    up, down = (mutual_information(H, P + step, "qpsk", 0.75).mean() for step in (change, -change))
     slope = np.sum((gradient.conj() * change[:, 0]).real)
     assert slope == pytest.approx((up - down) / 2, rel=0.03)

@@ -1,8 +1,12 @@
+"""Alphabets and the cutoff rate: published values, the equation as printed, a radio's own steps."""
+
 from itertools import product
 
 import numpy as np
 import pytest
 from closed_forms import channel
+from hypothesis import given
+from hypothesis import strategies as st
 
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InputError
@@ -12,11 +16,13 @@ from faao_mav.radio.constellation import (
     constellation,
     coordinates,
     difference_classes,
+    difference_vector_count,
     features,
     symbol_vectors,
 )
 from faao_mav.radio.precoder import bpsk_two_antennas
 from faao_mav.radio.rate import SquareSum, cutoff_rate, draw_rates, exponents
+from faao_mav.radio.rate_steps import RateSteps, one_stream
 
 # Every case whose rho^{2N} pairs can be gone through one by one in about a second.
 SMALL = [
@@ -101,3 +107,68 @@ def test_sums_over_all_differences(antennas: int, monkeypatch: pytest.MonkeyPatc
         found = sums.sums(coordinates(Z), 1 + antennas**2)
         np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(sums.sums(coordinates(Z), 1), found[:, :1], rtol=1e-12)
+
+
+def test_number_of_classes() -> None:
+    for modulation, antennas, count in (
+        ("bpsk", 2, 4),
+        ("qpsk", 2, 20),
+        ("8psk", 2, 136),
+        ("16qam", 2, 574),
+        ("bpsk", 4, 40),
+        ("qpsk", 3, 182),
+    ):
+        assert len(difference_classes(modulation, antennas).vectors) == count
+
+
+def test_unit_energy_zero_mean_and_every_pair_once() -> None:
+    for modulation in MODULATIONS:
+        symbols = constellation(modulation)
+        assert np.mean(np.abs(symbols) ** 2) == pytest.approx(1.0, abs=1e-14)
+        assert abs(symbols.mean()) < 1e-14
+        assert len(np.unique(np.round(symbols, 9))) == len(symbols)
+        for antennas in (1, 2, *((3, 6) if modulation == "bpsk" else ())):
+            classes = difference_classes(modulation, antennas)
+            assert classes.symbols == len(symbols) ** antennas
+            assert classes.multiplicity.sum() + classes.symbols == classes.symbols**2
+            assert classes.bits == pytest.approx(np.log2(classes.symbols))
+            assert len(classes.vectors) < difference_vector_count(modulation, antennas)
+            for shared in (symbols, classes.vectors, classes.multiplicity):
+                assert not shared.flags.writeable  # all are given the same array
+    with pytest.raises(InputError, match=r"'psk8'.*8psk"):
+        constellation("psk8")
+
+
+ROWS = st.lists(st.tuples(st.floats(-20, 40), st.floats(0.01, 10)), min_size=1, max_size=12)
+SNR = 10 ** np.linspace(-4, 6, 2001)
+
+
+@given(ROWS, st.floats(0.1, 8))
+def test_steps_and_what_rises_about_them(rows: list[tuple[float, float]], width: float) -> None:
+    snr_db, rates = zip(*rows, strict=True)
+    steps = RateSteps.of(snr_db, rates)
+    value = steps.value(SNR)
+    for snr, had_there in zip(SNR[::50], value[::50], strict=True):
+        had = [r for s, r in rows if s <= 10 * np.log10(snr)]
+        assert had_there == max(had, default=0.0)
+    assert steps.most == max(rates)
+    smooth, above = steps.widened(width).value(SNR), steps.above(width).value(SNR)
+    assert (np.diff(smooth) >= -1e-12).all()
+    assert (above >= value - 1e-12).all()
+    step = np.diff(np.log10(SNR))[0] * 10
+    sums = [float(np.sum(each) * step) for each in (smooth, value)]  # one mean over a sweep
+    assert sums[0] == pytest.approx(sums[1], abs=2 * step * steps.most)
+
+
+@given(st.integers(1, 4), st.integers(1, 4), st.integers(1, 3), st.integers(0, 2**31))
+def test_no_stream_is_stronger(receive: int, transmit: int, draws: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = (draws, receive, transmit)
+    H = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    P = one_stream(H, 4.0)
+    assert np.sum(np.abs(P) ** 2) == pytest.approx(4.0)
+    assert not P[:, 1:].any()
+    others = rng.standard_normal((50, transmit, 1)) + 1j * rng.standard_normal((50, transmit, 1))
+    others *= 2 / np.linalg.norm(others, axis=1, keepdims=True)
+    gains = np.sum(np.abs(H @ others[:, None]) ** 2, axis=(-2, -1)).mean(axis=-1)
+    assert np.sum(np.abs(H @ P) ** 2, axis=(-2, -1)).mean() >= gains.max() * (1 - 1e-9)

@@ -145,9 +145,7 @@ def test_heights_that_are_not_known_are_the_nearest_and_others_refused(tmp_path:
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match=f"{name}: .*{told}"):
             read_terrain(tmp_path / name)
-
-
-def test_tiles_south_and_west_have_their_corner_there(tmp_path: Path) -> None:
+    # tiles south and west have their corner there
     side = np.arange(1201)
     path = tmp_path / "S36W071.hgt"
     path.write_bytes(np.add.outer(-side, side).astype(">i2").tobytes())

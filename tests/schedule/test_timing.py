@@ -62,10 +62,7 @@ def test_the_commands_that_made_a_flight_are_found_in_few_flights(
     assert found.deviation.max < 0.5
     assert len(flights) <= 6
 
-
-def test_a_flight_without_an_end_is_not_the_one_that_fits(monkeypatch: pytest.MonkeyPatch) -> None:
-    plan, fly = planned(route_with(SPEEDS, WAITS)), ArduCopter.fly
-
+    # a flight without an end is not the one that fits
     def followed(model: ArduCopter, path: FlightPath) -> Flown:
         if not np.allclose(path.speeds, GUESS.speeds):
             raise InputError("the flight would take more than 21600 s")

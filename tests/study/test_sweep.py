@@ -1,16 +1,29 @@
-"""What a study runs: values, grids, and the plans that they make."""
+"""What a study runs: values, grids, and the plans that they make; the trade-off of a plan."""
 
+import json
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from conftest import MISSIONS, SMALL, edited
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from faao_mav.cli.main import app
 from faao_mav.errors import InputError, PlanError
 from faao_mav.plan import parse_plan, read_plan
+from faao_mav.plan.keys import POWER
 from faao_mav.study import make_cases, parse_vary
-from faao_mav.study.sweep import MAX_ROWS, parse_schemes, parse_values
+from faao_mav.study.figure import frontier_table, pareto
+from faao_mav.study.rows import StudyRow
+from faao_mav.study.sweep import (
+    MAX_ROWS,
+    frontier_cases,
+    parse_frontier,
+    parse_schemes,
+    parse_values,
+)
 
 
 @given(
@@ -43,10 +56,7 @@ def test_values_are_those_of_yaml() -> None:
     assert parse_values("-40:0:5", "--power") == tuple(range(-40, 1, 5))
     assert parse_values("10:0:-4", "--power") == (10, 6, 2)
     assert parse_values("1, 5:7:1, 2.5", "--power") == (1, 5, 6, 7, 2.5)
-    assert parse_vary("flight.start=[0, 350],[0,100]") == (
-        "flight.start",
-        ([0, 350], [0, 100]),
-    )
+    assert parse_vary("flight.start=[0, 350],[0,100]")[1] == ([0, 350], [0, 100])
     assert parse_vary("radio.causal=false,true")[1] == (False, True)
 
 
@@ -87,11 +97,8 @@ def test_schemes_are_methods_precoders_and_inputs() -> None:
         parse_plan(edited(SMALL, {"study": {"schemes": ["rzf"]}}))
     cases = make_cases(SMALL, vary={}, schemes=("faao", "algorithm1", "mrt"))
     made = [parse_plan(case.text).optimizer for case in cases]
-    assert [(each.method, each.precoder) for each in made] == [
-        ("direct", "faao"),
-        ("algorithm1", "faao"),
-        ("direct", "mrt"),
-    ]
+    assert [each.method for each in made] == ["direct", "algorithm1", "direct"]
+    assert [each.precoder for each in made] == ["faao", "faao", "mrt"]
 
 
 def test_the_grid_is_every_plan_once() -> None:
@@ -110,9 +117,7 @@ def test_the_grid_is_every_plan_once() -> None:
         assert plan.optimizer.inputs == ("gaussian" if case.scheme == "gaussian" else "alphabet")
         assert plan.radio.seed == case.seed in (0, 1, 2)
         assert plan.study is None
-
-
-def test_the_same_work_has_the_same_key_whatever_the_study() -> None:
+    # the same work has the same key whatever the study
     wide = make_cases(SMALL, vary={"radio.rician_factor": (1, 2, 3)})
     narrow = make_cases(SMALL + "study: {seeds: 4}\n", vary={"radio.rician_factor": (2,)})
     assert narrow[0].key == wide[1].key
@@ -126,13 +131,74 @@ def test_the_study_of_a_plan() -> None:
     assert (study.schemes, study.seeds, study.figure) == (("faao", "zf"), 2, "delivered")
     assert parse_plan(SMALL).study is None
 
+    paper = read_plan(MISSIONS / "paper_active.yaml")
+    for name in ("paper_fig3", "paper_fig4", "gaussian_cost"):  # of Section IV
+        plan = read_plan(MISSIONS / f"{name}.yaml")
+        assert plan.study is not None
+        assert (plan.flight.start, plan.flight.end) == (paper.flight.start, paper.flight.end)
+        assert (plan.vehicle, plan.powers) == (paper.vehicle, paper.powers)
+        assert plan.radio.relay.noise >= paper.radio.relay.noise
+        for case in make_cases(plan.text, vary=plan.study.vary, schemes=plan.study.schemes):
+            assert parse_plan(case.text).flight.altitude == 100
 
-@pytest.mark.parametrize("name", ["paper_fig3", "paper_fig4", "gaussian_cost"])
-def test_sample_studies_are_of_section_iv(name: str) -> None:
-    plan, paper = (read_plan(MISSIONS / f"{each}.yaml") for each in (name, "paper_active"))
-    assert plan.study is not None
-    assert (plan.flight.start, plan.flight.end) == (paper.flight.start, paper.flight.end)
-    assert (plan.vehicle, plan.powers) == (paper.vehicle, paper.powers)
-    assert plan.radio.relay.noise >= paper.radio.relay.noise
-    for case in make_cases(plan.text, vary=plan.study.vary, schemes=plan.study.schemes):
-        assert parse_plan(case.text).flight.altitude == 100
+
+points = st.tuples(st.integers(0, 9), st.none() | st.integers(0, 9))
+
+
+@given(st.lists(points, max_size=12))
+def test_no_point_is_better_than_one_of_the_frontier(
+    all_points: list[tuple[int, int | None]],
+) -> None:
+    rows = [
+        StudyRow("", {POWER: power}, "faao", 0, delivered=data, delivered_mbytes=data)
+        for power, data in all_points
+    ]
+    best = {(row.values[POWER], row.delivered) for row in pareto(rows, POWER)}
+    there = {(power, data) for power, data in all_points if data is not None}
+    assert best == {
+        (power, data)
+        for power, data in there
+        if not any(p <= power and d >= data and (p, d) != (power, data) for p, d in there)
+    }
+
+
+def test_the_table_has_the_points_of_the_frontier() -> None:
+    plan, key = parse_plan(edited(SMALL, {"radio.bandwidth_mhz": 1})), "flight.duration"
+    rows = [
+        StudyRow("", {key: T}, "faao", 0, delivered=0.5, delivered_mbytes=data, error=error)
+        for T, data, error in ((8.0, 3.0, ""), (9.0, 2.5, ""), (10.0, 4.0, "late"))
+    ]
+    lines = frontier_table(rows, plan, key).splitlines()
+    assert lines[0].split() == ["duration,", "s", "delivered,", "megabytes", "bit/s/Hz"]
+    assert [line.split() for line in lines[1:3]] == [["8", "3", "0.5000"], ["10", "4", "0.5000"]]
+    assert lines[3] == "1 of 3 points failed, first: late"
+
+
+def test_the_cases_end_at_the_plan() -> None:
+    plan = parse_plan(edited(SMALL, {"radio.relay.power_dbm": 7.5, "goal": {"maximise": "rate"}}))
+    times = [parse_plan(case.text) for case in frontier_cases(plan, "flight.duration", 4)]
+    assert [each.flight.duration for each in times][-1] == plan.flight.duration
+    assert all(each.powers == plan.powers for each in times)
+    powers = [parse_plan(case.text) for case in frontier_cases(plan, POWER, 3)]
+    assert powers[-1].powers == pytest.approx(plan.powers)
+    assert powers[0].powers == pytest.approx([power / 100 for power in plan.powers])
+    for text in ("power", "data,power", "mass,data", "power,data,data"):
+        with pytest.raises(InputError, match=r"--frontier .*duration,data or power,data"):
+            parse_frontier(text)
+
+
+def test_a_frontier_is_drawn_and_told(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.yaml"
+    plan.write_text(
+        edited(SMALL, {"radio.fading": "none", "radio.bandwidth_mhz": 1, "flight.time_step": 1})
+    )
+    run = ["study", str(plan), "--frontier", "duration,data", "--points", "3", "--jobs", "1"]
+    told = CliRunner().invoke(app, [*run, "--out", str(tmp_path / "out"), "--json"])
+    assert told.exit_code == 0, told.output
+    assert (tmp_path / "out" / "figure.svg").stat().st_size > 10_000
+    rows = json.loads(told.stdout)["rows"]
+    amounts = [row["delivered_mbytes"] for row in rows]
+    assert amounts == sorted(amounts)
+    assert rows[-1]["flight.duration"] == parse_plan(plan.read_text()).flight.duration
+    refused = CliRunner().invoke(app, [*run, "--power", "1,2"])
+    assert refused.exit_code == 2
