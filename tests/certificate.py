@@ -106,7 +106,7 @@ def _apart(
     return limits
 
 
-def _never_slow(kin: Kinematics, flight: Trajectory, moved: FlightVariables) -> list[Any]:
+def _never_slow(kin: Kinematics, flight: Trajectory, moved: Any) -> list[Any]:
     """Return the limits of an aircraft that cannot hover, linear in its move from `flight`."""
     x, grid, limits = unknowns(kin, flight), Grid.of(kin), list[Any]()
     by_slot = cp.hstack([moved.w, moved.v, moved.a]).T - x

@@ -23,17 +23,11 @@ def random_flight(kin: Kinematics, seed: int) -> Trajectory:
     return straight
 
 
-def rough_grid(seed: int, cells: int = 12, low: float = -40.0, high: float = 110.0) -> Grid:
-    """Return shadows of 20 dB that end within a cell."""
-    rng = np.random.default_rng(seed)
-    x, y = np.linspace(low, high, cells), np.linspace(low + 7, high - 3, cells + 3)
-    return Grid.through(x, y, np.where(rng.random((cells, cells + 3)) < 0.4, -20.0, 0.0))
-
-
 def with_maps(problem: Problem, seed: int) -> Problem:
-    """Return `problem` with a rough grid above the laws of either hop."""
-    first, second = (
-        replace(link, gains=replace(link.gains, above=rough_grid(seed + hop)))
-        for hop, link in enumerate(problem.links)
-    )
-    return replace(problem, bs_uav=first, uav_user=second)
+    """Return `problem` with shadows of 20 dB that end within a cell above both hops' laws."""
+    x, y, links = np.linspace(-40.0, 110.0, 12), np.linspace(-33.0, 107.0, 15), []
+    for hop, link in enumerate(problem.links):
+        shadow = np.random.default_rng(seed + hop).random((12, 15)) < 0.4
+        above = Grid.through(x, y, np.where(shadow, -20.0, 0.0))
+        links.append(replace(link, gains=replace(link.gains, above=above)))
+    return replace(problem, bs_uav=links[0], uav_user=links[1])

@@ -55,7 +55,7 @@ def test_a_track_is_straight_between_its_points_and_its_first_is_the_start(
     assert parse_plan(plan.text).radio == plan.radio
 
 
-def test_a_file_of_a_track_is_in_the_text_of_the_plan(tmp_path: Path) -> None:
+def test_files_of_tracks_are_in_the_text_of_the_plan_or_refused(tmp_path: Path) -> None:
     rows = "".join(f"a, {row}\n" for row in WAY.splitlines()[1:])
     (tmp_path / "convoy.csv").write_text(f"# a convoy\nname, TIME_S, east_m, north_m\n{rows}")
     points = "".join(
@@ -78,9 +78,6 @@ def test_a_file_of_a_track_is_in_the_text_of_the_plan(tmp_path: Path) -> None:
         each.unlink()
     assert parse_plan(plan.text).radio == plan.radio
     assert plan.changed({"flight.duration": 9}).radio == plan.radio
-
-
-def test_what_is_wrong_with_gpx_or_too_long_is_told(tmp_path: Path) -> None:
     for text, told in (
         ("", "ship.gpx: not XML"),
         ("<gpx/>", "ship.gpx: 0 points with a time"),

@@ -126,9 +126,19 @@ def test_a_flight_without_a_mission_is_a_result(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_summary_of_a_flight_without_findings_is_short(
-    result: Result, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_summaries_say(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    wanted = result.solution.plan.changed({"optimizer.rate": "mutual_information"})
+    result = replace(result, information=MutualInformation(1.9, 1.8, 1.7, 0.001))
+    for gain, doubted in ((0.05, False), (0.0005, True)):
+        solution = replace(result.solution, problem=build_problem(wanted), gain=gain)
+        text = summary(replace(result, solution=solution), verbose=True)
+        assert "of mutual information (base station to UAV" in text
+        assert f"{gain:.4f} bit/s/Hz more than by the plan for the cutoff rate" in text
+        assert ("below the error of averages over the noise, 0.001" in text) is doubted
+        told = replace(result, solution=solution).as_dict()
+        assert (told["rate"], told["gain_over_cutoff"]) == ("mutual_information", gain)
+    told = result.as_dict()
+    assert (told["rate"], told["gain_over_cutoff"]) == ("cutoff", None)
     assert result.check is not None
     quiet = replace(
         result,
@@ -153,21 +163,6 @@ def test_a_summary_of_a_flight_without_findings_is_short(
     for word in ("NOT CONVERGED", "stopped after 3 steps", "not compared with recorded flights"):
         assert word in text
     assert "not compared" in result.as_dict()["predicted"]["assumption"]
-
-
-def test_it_says_what_planning_for_the_mutual_information_gains(result: Result) -> None:
-    wanted = result.solution.plan.changed({"optimizer.rate": "mutual_information"})
-    result = replace(result, information=MutualInformation(1.9, 1.8, 1.7, 0.001))
-    for gain, doubted in ((0.05, False), (0.0005, True)):
-        solution = replace(result.solution, problem=build_problem(wanted), gain=gain)
-        text = summary(replace(result, solution=solution), verbose=True)
-        assert "of mutual information (base station to UAV" in text
-        assert f"{gain:.4f} bit/s/Hz more than by the plan for the cutoff rate" in text
-        assert ("below the error of averages over the noise, 0.001" in text) is doubted
-        told = replace(result, solution=solution).as_dict()
-        assert (told["rate"], told["gain_over_cutoff"]) == ("mutual_information", gain)
-    told = result.as_dict()
-    assert (told["rate"], told["gain_over_cutoff"]) == ("cutoff", None)
 
 
 BAND = {"radio.fading": "none", "radio.bandwidth_mhz": 20}

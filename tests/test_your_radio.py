@@ -49,18 +49,6 @@ def written(folder: Path, changes: dict[str, Any], link: str = LINK) -> Path:
     return plan
 
 
-def test_a_law_of_a_file_is_that_of_both_hops_or_of_one(tmp_path: Path) -> None:
-    both = read_plan(written(tmp_path, {"radio.gain": "link.yaml"}))
-    for law in both.radio.path_gains:
-        assert law.reference_gain == pytest.approx(10**-4.45)
-        assert law.elevation_db == (18, -30, 10)
-    assert parse_plan(both.text).radio == both.radio  # without the file
-    one = read_plan(written(tmp_path, {"radio.ground_user.gain": "link.yaml"}))
-    assert [law.square for law in one.radio.path_gains] == [True, False]
-    assert one.radio.path_gains[0].reference_gain == one.radio.reference_gain
-    assert one.radio.gain_laws[1].spread_db == 5.5
-
-
 SIDE = np.arange(-50.0, 351.0, 20.0)
 MAP: dict[str, Any] = {
     "east": SIDE,
@@ -69,13 +57,6 @@ MAP: dict[str, Any] = {
     "gain_db": -90.0 - np.arange(2.0)[:, None, None] - SIDE / 100 + np.zeros((2, 21, 21)),
 }
 ABOVE = {"above_law_db" if key == "gain_db" else key: value for key, value in MAP.items()}
-
-SQUARE = {
-    "optimizer.method": "algorithm1",
-    "radio.gain.exponent": 2,
-    "radio.fading": "none",
-    "radio.causal": False,
-}
 
 
 def mapped(folder: Path, arrays: dict[str, Any], changes: dict[str, Any]) -> Path:
@@ -106,8 +87,9 @@ def test_a_map_stands_in_the_text_of_a_plan(tmp_path: Path) -> None:
     for link in build_problem(law).links:
         assert link.gains.law.db(np.array([30.0]), 40.0) == pytest.approx(-50 - 25 * np.log10(50))
         assert link.gains.above is not None
+    square = {"optimizer.method": "algorithm1", "radio.gain.exponent": 2, "radio.fading": "none"}
     with pytest.raises(PlanError, match=r"radio\.gain is not for algorithm1"):
-        optimize(law.changed(SQUARE))
+        optimize(law.changed(square | {"radio.causal": False}))
 
 
 TABLE = """# two columns count
@@ -125,7 +107,7 @@ def tabled(folder: Path, changes: dict[str, Any] | None = None, table: str = TAB
     return written(folder, WIFI | (changes or {}))
 
 
-def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> None:
+def test_laws_and_rates_of_files_are_in_the_text_of_the_plan(tmp_path: Path) -> None:
     plan = read_plan(tabled(tmp_path))
     steps = plan.radio.rate_steps
     assert steps is not None
@@ -135,6 +117,15 @@ def test_a_table_of_rates_takes_the_place_of_the_alphabet(tmp_path: Path) -> Non
     steps = read_plan(tabled(tmp_path, table=in_hertz)).radio.rate_steps
     assert steps is not None
     assert steps.rates == (6.5, 13, 26)
+    both = read_plan(written(tmp_path, {"radio.gain": "link.yaml"}))
+    for law in both.radio.path_gains:
+        assert law.reference_gain == pytest.approx(10**-4.45)
+        assert law.elevation_db == (18, -30, 10)
+    assert parse_plan(both.text).radio == both.radio  # without the file
+    one = read_plan(written(tmp_path, {"radio.ground_user.gain": "link.yaml"}))
+    assert [law.square for law in one.radio.path_gains] == [True, False]
+    assert one.radio.path_gains[0].reference_gain == one.radio.reference_gain
+    assert one.radio.gain_laws[1].spread_db == 5.5
 
 
 WRONG_LAWS = (
@@ -261,9 +252,6 @@ def test_a_law_and_a_precoder_of_ones_own_are_as_the_plans() -> None:
     found = optimize(sample(), gain=Same(named.radio.path_gains[0]), precoder=SCHEMES["mrt"])
     assert found.delivered_rate == pytest.approx(wanted.delivered_rate, rel=1e-5)
     assert found.is_feasible(1e-6)
-
-
-def test_slopes_and_turns_by_differences() -> None:
     law, height = PathGain(1e-5, 2.4, (5.0, -30.0, 12.0)), 30.0
     away = np.random.default_rng(0).uniform(-300, 300, (2, 40))
     squared = np.sum(away**2, axis=0) + height**2

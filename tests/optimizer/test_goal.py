@@ -65,7 +65,7 @@ def test_the_least_duration_is_that_of_trying_all() -> None:
             assert found.least.below.delivered_rate < found.least.below.plan.needed_rate
 
 
-def test_the_least_power_is_just_enough() -> None:
+def test_the_least_power_is_just_enough_and_out_of_reach_says_what_is_possible() -> None:
     share, full = 0.6, delivered({})
     found = optimize(BASE.changed({"goal": {"rate": share * full, "minimise": "power"}}))
     base, relay = found.plan.radio.base_station.power, found.plan.radio.relay.power
@@ -85,6 +85,21 @@ def test_the_least_power_is_just_enough() -> None:
     told = Result(found).as_dict()["goal"]
     assert told["power_dbm"] == pytest.approx([dbm(base), dbm(relay)])
     assert told["one_step_less"]["delivered_rate"] == below.delivered_rate
+    most = delivered({})
+    for goal, *told in (
+        (
+            {"rate": 9.0, "minimise": "duration"},
+            "goal.rate: 9 bit/s/Hz cannot be delivered in 18 s (flight.duration) at 1 and 20 dBm",
+            f"at most {most:.4f} bit/s/Hz",
+        ),
+        (
+            {"deliver_mbytes": 900, "minimise": "power"},
+            f"at most {BASE.megabytes(most):.4g} megabytes",
+        ),
+    ):
+        with pytest.raises(InfeasibleError) as caught:
+            optimize(BASE.changed({"goal": goal}))
+        assert all(part in str(caught.value) for part in told)
 
 
 @given(
@@ -103,24 +118,6 @@ def test_the_least_number_is_that_of_trying_all(
     if surplus[high] >= 0:
         least = next(n for n in range(1, high + 1) if surplus[n] >= 0)
         assert least_number(surplus.__getitem__, 0, high, -1.0, surplus[high]) == least
-
-
-def test_a_goal_out_of_reach_says_what_is_possible() -> None:
-    most = delivered({})
-    for goal, *told in (
-        (
-            {"rate": 9.0, "minimise": "duration"},
-            "goal.rate: 9 bit/s/Hz cannot be delivered in 18 s (flight.duration) at 1 and 20 dBm",
-            f"at most {most:.4f} bit/s/Hz",
-        ),
-        (
-            {"deliver_mbytes": 900, "minimise": "power"},
-            f"at most {BASE.megabytes(most):.4g} megabytes",
-        ),
-    ):
-        with pytest.raises(InfeasibleError) as caught:
-            optimize(BASE.changed({"goal": goal}))
-        assert all(part in str(caught.value) for part in told)
 
 
 COPTER = parse_plan("""
@@ -178,7 +175,7 @@ def whole() -> Solution:
     return direct(build_problem(COPTER))
 
 
-def test_less_energy_never_delivers_more(whole: Solution) -> None:
+def test_less_energy_delivers_less_in_the_best_duration_of_all(whole: Solution) -> None:
     most = used(whole)
     data = []
     for share in (0.7, 1.01):
@@ -192,9 +189,6 @@ def test_less_energy_never_delivers_more(whole: Solution) -> None:
     assert found.plan.flight.duration == COPTER.flight.duration
     assert found.least is not None
     assert found.least.optimizations == 1
-
-
-def test_the_best_duration_is_that_of_trying_all() -> None:
     found = within(0.5)
     tried = []
     for slots in (len(found.w) - 1, len(found.w) + 1):
@@ -204,9 +198,13 @@ def test_the_best_duration_is_that_of_trying_all() -> None:
             tried.append(slots * each.delivered_rate)
     assert tried
     assert len(found.w) * found.delivered_rate >= max(tried) * (1 - 1e-3)
+    with pytest.raises(
+        InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
+    ):
+        within(0.2)
 
 
-def test_the_least_energy_is_below_that_of_the_whole_flight(
+def test_the_least_energy_is_below_the_whole_flights_or_refused(
     whole: Solution, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("faao_mav.optimizer.goal.ENERGY_SHARE", 0.01)
@@ -224,11 +222,6 @@ def test_the_least_energy_is_below_that_of_the_whole_flight(
     assert label == "goal"
     assert told.startswith(f"least energy for {asked:.5g} megabytes: {used(found):.4g} Wh in ")
     assert Result(found).as_dict()["goal"]["energy_wh"] == used(found)
-
-
-def test_where_no_less_energy_will_do_every_share_is_refused(
-    whole: Solution, monkeypatch: pytest.MonkeyPatch
-) -> None:
     tried: list[int] = []
 
     def none(_: goal_module._Flights, number: int) -> Solution:
@@ -239,13 +232,6 @@ def test_where_no_less_energy_will_do_every_share_is_refused(
     found = optimize(COPTER.changed({"goal": {"rate": 0.1, "minimise": "energy"}}))
     assert max(tried) == round(1 / goal_module.ENERGY_SHARE) - 1
     assert used(found) == used(whole)
-
-
-def test_too_little_energy_says_what_the_straight_flight_takes() -> None:
-    with pytest.raises(
-        InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
-    ):
-        within(0.2)
 
 
 HOVER = """
@@ -267,7 +253,7 @@ def hovering(changes: dict[str, Any] | None = None) -> Plan:
     return parse_plan(HOVER).changed(changes or {})
 
 
-def test_the_best_height_is_that_of_the_closed_form() -> None:
+def test_the_best_height_is_that_of_the_closed_form_and_the_better_of_two_optima() -> None:
     """20 log10(cos e) + c sin(e) is highest where c (1 - s^2) = 20 s / ln 10, s = sin(e)."""
     c = 16.0
     k = 20 / (math.log(10) * c)
@@ -275,8 +261,6 @@ def test_the_best_height_is_that_of_the_closed_form() -> None:
     found = optimize(hovering({"radio.gain.elevation_db": [c]}))
     assert found.plan.flight.altitude == pytest.approx(100 * s / math.sqrt(1 - s * s), abs=0.5)
 
-
-def test_the_better_of_two_local_optima_is_found() -> None:
     def peaks(candidate: Plan, known: Trajectory | None) -> Solution:
         asked.append(known is not None)
         height = candidate.flight.altitude
@@ -287,6 +271,9 @@ def test_the_better_of_two_local_optima_is_found() -> None:
     found = best_height(hovering(), peaks)
     assert found.plan.flight.altitude == pytest.approx(93.4, abs=0.5)
     assert asked == [False, *[True] * (len(asked) - 1)]  # each begins with a flight nearby
+    for height in ({"least": 20}, {"least": 60, "most": 40}, {"least": 0, "most": 40}, "high"):
+        with pytest.raises(PlanError, match=r"flight\.altitude: .*\{least: metres, most: metre"):
+            hovering({"flight.altitude": height})
 
 
 @pytest.fixture
@@ -297,7 +284,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("few")
-def test_the_ceiling_of_the_vehicles_fence_counts() -> None:
+def test_the_ceiling_of_the_vehicles_fence_and_a_goal_count() -> None:
     """Where the highest is the best; without terms over the elevation it is the lowest."""
     for autopilot, parameters, expected in (
         ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_TYPE": 9, "FENCE_ALT_MAX": 60}, 60.0),
@@ -315,11 +302,7 @@ def test_the_ceiling_of_the_vehicles_fence_counts() -> None:
 
     with pytest.raises(PlanError, match=r"flight\.altitude: 20 to 120 m.*-inf to 15 m"):
         optimize(hovering({"vehicle.autopilot": "px4", "vehicle.parameters.GF_MAX_VER_DIST": 15}))
-
-
-@pytest.mark.usefixtures("few")
-def test_a_goal_is_met_at_the_height_where_it_takes_least() -> None:
-    """Where gains are 3 dB higher, so much less power does."""
+    # where gains are 3 dB higher, so much less power does
     asked = {"goal": {"minimise": "power", "rate": 0.5}, "radio.gain.elevation_db": [12]}
     found = optimize(hovering({**asked, **dict.fromkeys(ALIASES[POWER], 20)}))
     assert found.height is not None
@@ -329,9 +312,3 @@ def test_a_goal_is_met_at_the_height_where_it_takes_least() -> None:
     gains = [each.problem.bs_uav.gains.gain(each.w.T).mean() for each in both]
     assert powers[1] / powers[0] == pytest.approx(gains[0] / gains[1], rel=0.01)
     assert gains[0] > 1.5 * gains[1]
-
-
-def test_other_heights_are_refused() -> None:
-    for height in ({"least": 20}, {"least": 60, "most": 40}, {"least": 0, "most": 40}, "high"):
-        with pytest.raises(PlanError, match=r"flight\.altitude: .*\{least: metres, most: metre"):
-            hovering({"flight.altitude": height})

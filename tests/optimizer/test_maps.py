@@ -216,11 +216,6 @@ def test_no_flight_goes_through_ground(
 
     assert told(found.w) == ""
     assert told(straight.w).startswith("in the ground under the map of the gain at [")
-
-
-def test_a_place_in_ground_is_named_and_steps_of_long_slots_are_few(
-    grounded: Callable[[dict[str, Any]], Plan],
-) -> None:
     with pytest.raises(PlanError, match=r"flight\.start: \[40\.0, 40\.0\] is .* the ground under"):
         grounded({"flight.start": [40, 40]})
     with pytest.raises(PlanError, match=r"mission\.path_tolerance"):

@@ -61,7 +61,7 @@ def test_every_start_keeps_the_least_speed_and_circles_at_the_stations(closed: b
                 assert near.sum() > 100
 
 
-def test_no_refusal_where_a_dubins_path_keeps_every_limit() -> None:
+def test_refused_is_where_no_flight_keeps_every_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     sides, seconds, speed, limit, step = (0, 1, 1), (7.0, 21.0, 8.0), 12.2, 2.1, 0.5
     time, since = step * np.arange(int(sum(seconds) / step) + 1), np.cumsum([0.0, *seconds[:2]])
     pieces = zip(sides, since, seconds, strict=True)
@@ -73,6 +73,12 @@ def test_no_refusal_where_a_dubins_path_keeps_every_limit() -> None:
     kin = replace(kin, start=np.zeros(2), end=end, start_velocity=v[0], end_velocity=v[-1])
     assert worst(kin, kin.follow(v)) < 1e-9
     assert worst(kin, straight_flight(kin)) < 1e-9
+    monkeypatch.setattr("faao_mav.optimizer.search.straight._REPAIRS", 1)  # more are as hopeless
+    monkeypatch.setattr("faao_mav.optimizer.search.straight._TRIES", 1)
+    kin = cruiser(5, 20.0)
+    kin = replace(kin, end=kin.start)
+    with pytest.raises(InfeasibleError, match=r"at least 20 m/s \(vehicle\.min_speed\) for 5 s"):
+        straight_flight(kin)
 
 
 def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it() -> None:
@@ -91,17 +97,6 @@ def test_an_airspeed_changes_as_slowly_as_thrust_and_drag_let_it() -> None:
     assert 0.99 * free.value < best.value < free.value
     gradient = np.abs(stage(best.trajectory.w.T).gradient).max()
     assert kkt_residual(kin, stage, best.trajectory) < 2e-3 * gradient
-
-
-def test_too_little_room_for_a_turn_is_refused_with_the_reason(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("faao_mav.optimizer.search.straight._REPAIRS", 1)  # more are as hopeless
-    monkeypatch.setattr("faao_mav.optimizer.search.straight._TRIES", 1)
-    kin = cruiser(5, 20.0)
-    kin = replace(kin, end=kin.start)
-    with pytest.raises(InfeasibleError, match=r"at least 20 m/s \(vehicle\.min_speed\) for 5 s"):
-        straight_flight(kin)
 
 
 def test_the_published_flight_is_reached() -> None:
@@ -146,19 +141,9 @@ def turned(solution: Solution) -> Real:
     return np.asarray(np.linalg.norm(solution.a[:-1], axis=1) / most)
 
 
-def test_turns_allowed_in_the_air_are_allowed_over_ground() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        wind, least = tuple(rng.uniform(-30, 30, 2).tolist()), float(rng.uniform(1, 25))
-        kin, size, theta = turner(2, least, wind), rng.uniform(least, 25, 3), rng.uniform(0, 7, 3)
-        x = size[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
-        allowed = kin.turn_limits(x + wind)
-        assert (kin.in_the_air().turn_limits(x) <= allowed * (1 + 1e-9)).all()
-        both = np.sqrt((size[1:] ** 2 + size[:-1] ** 2) / 2)
-        assert (TURN * both / 2 <= allowed * (1 + 1e-9)).all()
-
-
-def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: MakePlan) -> None:
+def test_turns_are_as_fast_as_the_guidance_follows(
+    small_plan: MakePlan,
+) -> None:
     plan = small_plan(TURNING | {"vehicle.min_speed": 9})
     solution = optimize(plan)
     assert solution.is_feasible()
@@ -174,6 +159,15 @@ def test_turns_are_as_fast_as_the_guidance_follows_at_the_speed(small_plan: Make
     residuals = optimize(lively).residuals()
     assert residuals["fall of airspeed"] < 1e-6
     assert residuals["minimum speed"] < 1e-6
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        wind, least = tuple(rng.uniform(-30, 30, 2).tolist()), float(rng.uniform(1, 25))
+        kin, size, theta = turner(2, least, wind), rng.uniform(least, 25, 3), rng.uniform(0, 7, 3)
+        x = size[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+        allowed = kin.turn_limits(x + wind)
+        assert (kin.in_the_air().turn_limits(x) <= allowed * (1 + 1e-9)).all()
+        both = np.sqrt((size[1:] ** 2 + size[:-1] ** 2) / 2)
+        assert (TURN * both / 2 <= allowed * (1 + 1e-9)).all()
 
 
 def test_algorithm_1_is_for_aircraft_that_can_hover(paper_plan: MakePlan) -> None:

@@ -56,7 +56,9 @@ OBJECT = "{'descr': '|O', 'fortran_order': False, 'shape': (1,), }\n"
 WORDS = "{'descr': '<U3', 'fortran_order': False, 'shape': (), }\n"
 
 
-def test_members_that_are_no_result_are_refused(solution: Solution, tmp_path: Path) -> None:
+def test_what_is_no_result_is_refused(
+    solution: Solution, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path, other = tmp_path / "result.npz", tmp_path / "other.npz"
     save_solution(solution, path)
     for name, member, said in (
@@ -83,9 +85,6 @@ def test_members_that_are_no_result_are_refused(solution: Solution, tmp_path: Pa
                 target.writestr(each, member if each == f"{name}.npy" else source.read(each))
         with pytest.raises(InputError, match=rf"other\.npz: {said}"):
             load_solution(other)
-
-
-def test_archives_that_cannot_be_unpacked_are_refused(solution: Solution, tmp_path: Path) -> None:
     path = tmp_path / "result.npz"
     save_solution(solution, path)
     saved = path.read_bytes()
@@ -110,12 +109,7 @@ def test_archives_that_cannot_be_unpacked_are_refused(solution: Solution, tmp_pa
     np.savez(path, t=np.arange(3))
     with pytest.raises(InputError, match="not a result"):
         load_solution(path)
-
-
-def test_an_archive_that_unpacks_to_any_size_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What is unpacked before that is in memory once: 400 MB at most."""
+    # what is unpacked before that is in memory once: 400 MB at most
     monkeypatch.setattr(files, "MAX_BYTES", 1_000_000)
     path = tmp_path / "result.npz"
     for size, told in ((9_000_000, "more than 1,000,000 bytes"), (900_000, "not a result of faao")):
@@ -130,7 +124,9 @@ def test_an_archive_that_unpacks_to_any_size_is_refused(
             tracemalloc.stop()
 
 
-def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
+def test_a_tampered_solution_proves_nothing_and_spare_power_is_told(
+    solution: Solution, small_plan: MakePlan
+) -> None:
     assert replace(solution, P_B=1.1 * solution.P_B).residuals()[
         "(13b) power of the base station"
     ] == pytest.approx(0.21, rel=1e-3)
@@ -139,9 +135,6 @@ def test_a_tampered_solution_does_not_prove_itself(solution: Solution) -> None:
     assert replace(solution, w=solution.w + 1).residuals()["(13d) ends"] == pytest.approx(1)
     assert solution.is_feasible()
     assert not replace(solution, P_B=1.1 * solution.P_B).is_feasible()
-
-
-def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None:
     information, rates = price(solution), solution.rates
     assert information.error <= 1e-3
     assert rates.R_U < information.bs_uav < 2
@@ -150,9 +143,6 @@ def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None
     assert price(solution) == information
     assert not saturation(solution).saturated
     assert saturation(solution).spare_db == 0
-
-
-def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan) -> None:
     changes = {"radio.base_station.power_dbm": 0, "radio.relay.power_dbm": 0}
     few, many = (
         price(optimize(small_plan(changes | {"radio.fading": "none", "flight.time_step": step})))
@@ -160,9 +150,6 @@ def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan) -
     )
     assert many.average == pytest.approx(few.average, abs=0.01)
     assert many.delivered == pytest.approx(few.delivered, abs=0.01)
-
-
-def test_spare_power_is_what_could_be_saved(small_plan: MakePlan) -> None:
     powers = {"radio.base_station.power_dbm": 40, "radio.relay.power_dbm": 40}
     found = optimize(small_plan(FEW | powers))
     limit = saturation(found)

@@ -108,7 +108,18 @@ def test_as_good_as_many_random_starts(modulation: str, W: float, seed: int) -> 
     assert float(log_sum(H, best(H, W, modulation)[0], modulation)) < least + 1e-3
 
 
-def test_channels_that_lead_nowhere() -> None:
+def test_extremes_and_channels_that_lead_nowhere() -> None:
+    H = channel(8, 4, 2, 2)
+    largest = np.linalg.svd(H, compute_uv=False)[:, 0]
+    for modulation, snr in product(("bpsk", "qpsk", "16qam"), (1e-12, 1e-5, 1e4, 1e9)):
+        P, rate = best(H, snr, modulation)
+        assert np.all(np.isfinite(log_sum(H, P, modulation)))
+        if snr < 1e-4:  # all on the strongest mode: R_0 = mean of D / ln 2, E||H P u||² = 2 λ² W
+            expected = snr * largest**2 / 2.0 / np.log(2.0)
+            np.testing.assert_allclose(rate, expected, rtol=1e-4, atol=1e-14)
+        else:
+            np.testing.assert_allclose(rate, difference_classes(modulation, 2).bits, atol=1e-6)
+        assert np.all(np.isfinite(best_precoders(H[None], snr, modulation, 1.0)))
     H: Complex = np.stack([np.zeros((2, 2)), np.eye(2)]).astype(np.complex128)
     P, _ = best(H, 2.0, "qpsk")
     assert P[0] == pytest.approx(np.eye(2))
@@ -121,20 +132,13 @@ def test_channels_that_lead_nowhere() -> None:
     H = channel(7, 4, 1, 2)
     silent = np.concatenate([H, np.zeros_like(H)], axis=1)
     np.testing.assert_allclose(best(silent, 2.0, "qpsk")[1], best(H, 2.0, "qpsk")[1], rtol=1e-5)
-
-
-def test_extremes() -> None:
-    H = channel(8, 4, 2, 2)
-    largest = np.linalg.svd(H, compute_uv=False)[:, 0]
-    for modulation, snr in product(("bpsk", "qpsk", "16qam"), (1e-12, 1e-5, 1e4, 1e9)):
-        P, rate = best(H, snr, modulation)
-        assert np.all(np.isfinite(log_sum(H, P, modulation)))
-        if snr < 1e-4:  # all on the strongest mode: R_0 = mean of D / ln 2, E||H P u||² = 2 λ² W
-            expected = snr * largest**2 / 2.0 / np.log(2.0)
-            np.testing.assert_allclose(rate, expected, rtol=1e-4, atol=1e-14)
-        else:
-            np.testing.assert_allclose(rate, difference_classes(modulation, 2).bits, atol=1e-6)
-        assert np.all(np.isfinite(best_precoders(H[None], snr, modulation, 1.0)))
+    for power, noise, modulation, message in (
+        (0.0, 1.0, "qpsk", "power"),
+        (1.0, 0.0, "qpsk", "noise"),
+        (1.0, 1.0, "pam", "modulation"),
+    ):
+        with pytest.raises(InputError, match=message):
+            best_precoders(np.eye(2)[None], power, modulation, noise)
 
 
 @SETTINGS
@@ -173,13 +177,3 @@ def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
     assert np.mean(rate) > np.mean(known)
     # but not the precoders of somebody who knows the fading
     assert np.all(rate <= np.mean(best(draws, W, modulation)[1], axis=1))
-
-
-def test_unusable_input() -> None:
-    for power, noise, modulation, message in (
-        (0.0, 1.0, "qpsk", "power"),
-        (1.0, 0.0, "qpsk", "noise"),
-        (1.0, 1.0, "pam", "modulation"),
-    ):
-        with pytest.raises(InputError, match=message):
-            best_precoders(np.eye(2)[None], power, modulation, noise)

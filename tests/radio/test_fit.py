@@ -1,6 +1,7 @@
-"""A law fitted to levels along flights about which fields are drawn; the map of what it leaves."""
+"""Levels measured in flight: tables of them, the law that is fitted, the map of what it leaves."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.radio.fit import LinkFit, Samples, fit_link
 from faao_mav.radio.kriging import kriged
+from faao_mav.radio.measured import read_measured
 from faao_mav.radio.spline import Spline
 
 
@@ -99,7 +101,7 @@ def test_outliers_move_nothing_and_what_is_not_finite_or_not_flown_is_left_out()
     assert off(fit, (-45.0, 2.0)) < 3.0
 
 
-def test_one_leg_gives_the_level_alone_and_no_flight_is_refused() -> None:
+def test_one_leg_and_no_spread_of_elevations_give_no_terms_that_run_wild() -> None:
     one = flight(50.0, rows=1)
     fit = fit_link(levels([one], (-45.0, 2.0, 30.0, -20.0), 3.0, 30.0, 0))
     assert fit.legs == 1
@@ -111,10 +113,7 @@ def test_one_leg_gives_the_level_alone_and_no_flight_is_refused() -> None:
     some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
     with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
         fit_link([some])
-
-
-def test_no_elevation_spread_gives_no_terms_that_run_wild() -> None:
-    """High above and far away the sine hardly changes: its terms would be anything elsewhere."""
+    # high above and far away the sine hardly changes: its terms would be anything elsewhere
     far = flight(30.0)
     far = replace(far, place=far.place + np.array([3000.0, 0.0, 0.0]))
     for seed in range(2):
@@ -152,7 +151,7 @@ def apart(shadow: Spline, value: Real, x: Real, y: Real) -> float:
     return float(np.sqrt(np.mean((shadow.value(x, y) - value) ** 2)))
 
 
-def test_a_field_between_the_legs_is_told_and_nothing_far_away() -> None:
+def test_the_map_tells_a_field_between_the_legs_and_is_none_of_noise() -> None:
     shadow = field(1, 4.0)
     fit = fit_link([legs(shadow, 1.0)], 1.0)
     found, alone, error = kriged(fit, STATION)
@@ -166,10 +165,95 @@ def test_a_field_between_the_legs_is_told_and_nothing_far_away() -> None:
     assert far == pytest.approx(0, abs=1e-9)
     assert (found.origin, found.above_law) == ((47.0, 8.0), True)
     assert found.heights[0] <= 60 <= found.heights[-1]
-
-
-def test_where_what_is_left_is_seen_once_there_is_no_map() -> None:
     found, alone, error = kriged(fit_link([legs(field(4, 1e-9), 3.0)], 1.0), STATION)
     assert error > 0.97 * alone
     if found is not None:
         assert np.abs(found.db).max() < 3.0
+
+
+ANTENNA = (-35.0, 149.0, 10.0)
+
+
+def table(folder: Path, header: str, level: object, separator: str = ",") -> Path:
+    """A table of 20 rows that fly north from 111 m north of the station, at 60 m."""
+    rows = [
+        separator.join(map(str, (k, round(-34.999 + 1e-5 * k, 6), 149.0, 60.0, level)))
+        for k in range(20)
+    ]
+    path = folder / "levels.csv"
+    path.write_text("\n".join([header.replace(",", separator), *rows, ""]))
+    return path
+
+
+def test_headers_tell_what_is_measured_and_units_are_asked_for(tmp_path: Path) -> None:
+    for header, level, unit, value in (
+        ("time_s,latitude,longitude,altitude_m,rsrp_dbm", -80.5, "dbm", -80.5),
+        ("Time [s],Lat (deg),Lon (deg),Alt (m),RSRP [dBm]", -80.5, "dbm", -80.5),
+        ("t,lat,lng,height_m,SINR (dB)", 12.0, "db", 12.0),
+        ("timestamp_s,latitude,longitude,altitude_m,throughput_mbit_per_s", 20.0, "mbit/s", 20.0),
+        ("time_s,lat,lon,altitude_m,throughput kbit/s", 500.0, "mbit/s", 0.5),
+        ("time_s,lat,lon,alt_m,rssi_sik", 133, "dbm", -57.0),
+    ):
+        found = read_measured(table(tmp_path, header, level), ANTENNA)
+        assert found.unit == unit
+        np.testing.assert_allclose(found.samples.level, value)
+        np.testing.assert_allclose(found.samples.place[0], [0.0, 110.94, 50.0], atol=0.1)
+        assert found.left_out == 0
+    path = table(tmp_path, "time,lat,lon,alt,rssi", -70)
+    with pytest.raises(InputError, match=r"'alt' has no unit.*--unit altitude=UNIT, one of m"):
+        read_measured(path, ANTENNA)
+    found = read_measured(path, ANTENNA, {"altitude": "ft", "rssi": "dBm"})
+    np.testing.assert_allclose(found.samples.place[:, 2], 60 * 0.3048 - 10)
+    path = table(tmp_path, "time_s,lat,lon,alt_m,rssi", 100)
+    raw, sik = {"rssi": "raw"}, {"rssi": "sik"}
+    for units, calibration, level in (
+        (sik, (), 100 / 1.9 - 127),
+        (sik, [(119, -50)], -60.0),
+        (raw, [(20, -110), (200, -20)], -70.0),
+    ):
+        found = read_measured(path, ANTENNA, units, calibration)
+        np.testing.assert_allclose(found.samples.level, level)
+        assert found.unit == "dbm"
+    with pytest.raises(InputError, match=r"expected two of them in dBm by --calibrate"):
+        read_measured(path, ANTENNA, raw, [(0, -120)])
+    header = "time;lat;lon;alt_m;snr_db"
+    rows = [f"2024-05-01T10:00:{k:02d}Z;-34,999;149,0;60,0;1{k % 10},5" for k in range(20)]
+    rows[3], rows[7], rows[9] = "not a row", "2024-05-01T10:00:07Z;-34,999;149,0;60,0;NaN", ""
+    path = tmp_path / "levels.csv"
+    path.write_text("\n".join(["# a remark", header, *rows]))
+    found = read_measured(path, ANTENNA)
+    assert (len(found.samples.t), found.left_out) == (17, 2)
+    assert np.ptp(found.samples.t) == 19.0
+    assert found.samples.level[0] == 10.5
+
+
+def test_other_tables_are_refused(tmp_path: Path) -> None:
+    for header, level, message in (
+        ("time_s,lat,lon,alt_m,loss_db", 3, "line 1: no column of one of rsrp, rssi, snr, throu"),
+        ("time_s,lat,alt_m,x,rsrp_dbm", 3, "line 1: no column of longitude"),
+        ("time_s,lat,lon,alt_m,rsrp_watt", 3, "'rsrp_watt' has unit 'watt'.*one of dbm"),
+        ("time_s,lat,lon,alt_m,rsrp_dbm", 180, "levels about 180 dbm; expected -200 to 60"),
+        ("time_s,lon,lat,alt_m,rsrp_dbm", -80, "a latitude beyond 90"),
+        ("time_s,lat,alt_m,lon,rsrp_dbm", -80, "km from --station -35,149.*exchanged"),
+        ("time_s,lat,lon,alt_m,rsrp_dbm", "none", "no row with time, latitude"),
+    ):
+        with pytest.raises(InputError, match=message):
+            read_measured(table(tmp_path, header, level), ANTENNA)
+
+
+@given(st.text(alphabet='time_s,latonrspdbm(;\t"0123456789.-eNinf \n', max_size=300))
+def test_any_text_is_a_table_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, text: str
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    for content in (b"", b"\n\n", b"\xff\xfe\x00", b"time_s,lat,lon,alt_m,snr_db"):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"any\.csv"):
+            read_measured(path, ANTENNA)
+    path.write_text(f"time_s,lat,lon,alt_m,rsrp_dbm\n{text}")
+    try:
+        found = read_measured(path, ANTENNA)
+    except InputError as error:
+        assert "any.csv" in str(error)
+    else:
+        assert np.isfinite(found.samples.place).all()

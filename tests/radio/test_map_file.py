@@ -88,9 +88,8 @@ def test_a_map_with_an_origin_of_its_own_is_moved_as_a_whole() -> None:
         found.about(47.13, 8.0, 450.0)
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
+def test_arrays_and_tables_that_are_no_map_are_refused(tmp_path: Path) -> None:
+    arrays_told: tuple[tuple[dict[str, Any], str], ...] = (
         ({"east": None}, "gain_db, north in it; expected a map with east, north and gain_db or"),
         ({"above_law_db": np.zeros((4, 5))}, "above_law_db, east, gain_db, north in it; expected"),
         ({"gain_db": np.zeros((2, 4, 5))}, r"gain_db: 2 x 4 x 5 .* \(height, north, east\)"),
@@ -109,21 +108,13 @@ def test_a_map_with_an_origin_of_its_own_is_moved_as_a_whole() -> None:
         ({"origin": np.array([91.0, 0.0])}, "origin: .*expected latitude and longitude, degrees"),
         ({"origin": np.zeros(4)}, "origin: 4 of float64; expected 2 numbers"),
         ({"gain_db": np.array([{}], dtype=object)}, "not a map with east, north"),
-    ],
-)  # fmt: skip
-def test_arrays_that_are_no_map_are_refused(
-    tmp_path: Path, changes: dict[str, Any], told: str
-) -> None:
-    path = tmp_path / "a.npz"
-    kept: dict[str, Any] = {k: v for k, v in (SOUND | changes).items() if v is not None}
-    np.savez(path, **kept)
-    with pytest.raises(InputError, match=f"a.npz: {told}"):
-        read_map(path)
-
-
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
+    )  # fmt: skip
+    for changes, told in arrays_told:
+        kept = {k: v for k, v in (SOUND | changes).items() if v is not None}
+        np.savez(tmp_path / "a.npz", **kept)
+        with pytest.raises(InputError, match=f"a.npz: {told}"):
+            read_map(tmp_path / "a.npz")
+    for text, told in (
         ("", "line 1: columns ''; give a header with east_m, north_m and gain_db, or"),
         ("east_m,north_m\n0,0\n", "line 1: columns 'east_m, north_m'"),
         ("east_m,north_m,gain_db\n0,0,x\n", "line 2: gain_db: 'x' is no number"),
@@ -133,13 +124,10 @@ def test_arrays_that_are_no_map_are_refused(
         ("east_m,north_m,height_m,gain_db,ground_m\n"
          + "".join(f"{x},{y},{z},-9,{z}\n" for x in (0, 9) for y in (0, 9) for z in (50, 60)),
          "ground_m: differs between heights; expected one at a place"),
-    ],
-)  # fmt: skip
-def test_tables_that_are_no_map_are_refused(tmp_path: Path, text: str, told: str) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=f"a.csv: {told}"):
-        read_map(path)
+    ):  # fmt: skip
+        (tmp_path / "a.csv").write_text(text)
+        with pytest.raises(InputError, match=f"a.csv: {told}"):
+            read_map(tmp_path / "a.csv")
 
 
 def test_files_that_are_no_archive_and_words_that_are_no_map_are_refused(tmp_path: Path) -> None:

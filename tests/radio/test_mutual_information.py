@@ -39,21 +39,6 @@ def test_equation_5_as_printed(modulation: str) -> None:
         assert mutual_information(H, P, modulation, 1.0)[0] == pytest.approx(expected, abs=0.01)
 
 
-def test_the_spread_over_seeds_is_the_error() -> None:
-    """Beside many times as many noises; more noises err less."""
-    H, P = np.sqrt(2.0) * channel(4, 32, 2, 2), np.eye(2)[None]
-    exact = mutual_information(H, P, "qpsk", 1.0, nodes=1 << 17).mean()
-
-    def means(nodes: int) -> list[float]:
-        every = (mutual_information(H, P, "qpsk", 1.0, nodes=nodes, seed=k) for k in range(8))
-        return [float(found.mean()) for found in every]
-
-    few, many = means(512), means(1 << 13)
-    assert abs(np.mean(few) - exact) < 4 * np.std(few, ddof=1) / np.sqrt(8) + 1e-4
-    assert np.std(many) < 0.5 * np.std(few) < 0.02
-    assert abs(many[0] - exact) < 5e-3
-
-
 @settings(max_examples=20)
 @given(
     st.integers(0, 10_000),
@@ -78,7 +63,7 @@ def test_between_cutoff_rate_and_ceilings(
     assert mean <= min(classes.bits + 1e-9, gaussian + slack)
 
 
-def test_extremes() -> None:
+def test_extremes_the_slope_and_the_spread_over_seeds() -> None:
     H, P = np.array([[[1.0, 0.3j], [0.2, 1.0]]]), np.eye(2)[None]
     for modulation in ("bpsk", "8psk", "16qam"):
         bits = difference_classes(modulation, 2).bits
@@ -89,10 +74,7 @@ def test_extremes() -> None:
         assert weak == pytest.approx(np.linalg.norm(H) ** 2 / 1e5 / np.log(2.0), rel=0.05)
     with pytest.raises(InputError, match="noise"):
         mutual_information(ONE, ONE, "bpsk", 0.0)
-
-
-def test_the_errors_give_the_slope() -> None:
-    """I-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)."""
+    # i-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)
     H, P, change = channel(6, 1, 1, 2, 2), channel(7, 1, 1, 2, 2), 1e-4 * channel(8, 1, 1, 2, 2)
     errors = np.zeros((1, 1, 2, 2), dtype=np.complex128)
     mutual_information(H, P, "qpsk", 0.75, errors=errors)
@@ -100,3 +82,15 @@ def test_the_errors_give_the_slope() -> None:
     up, down = (mutual_information(H, P + step, "qpsk", 0.75).mean() for step in (change, -change))
     slope = np.sum((gradient.conj() * change[:, 0]).real)
     assert slope == pytest.approx((up - down) / 2, rel=0.03)
+    # beside many times as many noises; more noises err less
+    H, P = np.sqrt(2.0) * channel(4, 32, 2, 2), np.eye(2)[None]
+    exact = mutual_information(H, P, "qpsk", 1.0, nodes=1 << 17).mean()
+
+    def means(nodes: int) -> list[float]:
+        every = (mutual_information(H, P, "qpsk", 1.0, nodes=nodes, seed=k) for k in range(8))
+        return [float(found.mean()) for found in every]
+
+    few, many = means(512), means(1 << 13)
+    assert abs(np.mean(few) - exact) < 4 * np.std(few, ddof=1) / np.sqrt(8) + 1e-4
+    assert np.std(many) < 0.5 * np.std(few) < 0.02
+    assert abs(many[0] - exact) < 5e-3

@@ -60,21 +60,6 @@ def test_equation_7_as_printed(modulation: str, antennas: int) -> None:
     assert cutoff_rate(H, P, classes, 0.2) == pytest.approx(expected, abs=1e-11)
 
 
-def test_extended_precision_reference() -> None:
-    classes, H, P = difference_classes("8psk", 2), channel(9, 2, 2), np.eye(2)
-    for snr in (1e-3, 1.0, 30.0, 100.0):
-        D = exponents(H, P, classes.vectors, 1.0 / snr).astype(np.longdouble)
-        total = np.sum(classes.multiplicity * np.exp(-D)) / np.longdouble(classes.symbols)
-        expected = float(np.log2(np.longdouble(classes.symbols)) - np.log1p(total) / np.log(2.0))
-        assert cutoff_rate(H, P, classes, 1.0 / snr) == pytest.approx(expected, abs=1e-13)
-
-
-def test_noise_must_be_positive() -> None:
-    for noise in (0.0, -1.0, float("nan")):
-        with pytest.raises(InputError, match="noise"):
-            exponents(np.eye(1), np.eye(1), np.ones((1, 1)), noise)
-
-
 def pair_sums(modulation: str, antennas: int, Z: Complex) -> Real:
     """The sums over all differences of two vectors but 0, one after another, with u^H Z u."""
     symbols = constellation(modulation)
@@ -109,7 +94,7 @@ def test_sums_over_all_differences(antennas: int, monkeypatch: pytest.MonkeyPatc
         np.testing.assert_allclose(sums.sums(coordinates(Z), 1), found[:, :1], rtol=1e-12)
 
 
-def test_number_of_classes() -> None:
+def test_classes_hold_every_pair_and_extended_precision() -> None:
     for modulation, antennas, count in (
         ("bpsk", 2, 4),
         ("qpsk", 2, 20),
@@ -119,9 +104,6 @@ def test_number_of_classes() -> None:
         ("qpsk", 3, 182),
     ):
         assert len(difference_classes(modulation, antennas).vectors) == count
-
-
-def test_unit_energy_zero_mean_and_every_pair_once() -> None:
     for modulation in MODULATIONS:
         symbols = constellation(modulation)
         assert np.mean(np.abs(symbols) ** 2) == pytest.approx(1.0, abs=1e-14)
@@ -137,6 +119,15 @@ def test_unit_energy_zero_mean_and_every_pair_once() -> None:
                 assert not shared.flags.writeable  # all are given the same array
     with pytest.raises(InputError, match=r"'psk8'.*8psk"):
         constellation("psk8")
+    classes, H, P = difference_classes("8psk", 2), channel(9, 2, 2), np.eye(2)
+    for snr in (1e-3, 1.0, 30.0, 100.0):
+        D = exponents(H, P, classes.vectors, 1.0 / snr).astype(np.longdouble)
+        total = np.sum(classes.multiplicity * np.exp(-D)) / np.longdouble(classes.symbols)
+        expected = float(np.log2(np.longdouble(classes.symbols)) - np.log1p(total) / np.log(2.0))
+        assert cutoff_rate(H, P, classes, 1.0 / snr) == pytest.approx(expected, abs=1e-13)
+    for noise in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="noise"):
+            exponents(np.eye(1), np.eye(1), np.ones((1, 1)), noise)
 
 
 ROWS = st.lists(st.tuples(st.floats(-20, 40), st.floats(0.01, 10)), min_size=1, max_size=12)

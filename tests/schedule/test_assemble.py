@@ -44,9 +44,6 @@ def test_the_items_of_a_mission() -> None:
             assert place == pytest.approx(w[-1], abs=1e-3)
     kinds = [item.command for item in mission_of(t, w, plan_with(takeoff=False)).items[:2]]
     assert kinds == [Command.DO_CHANGE_SPEED, Command.NAV_WAYPOINT]
-
-
-def test_too_many_items_are_counted() -> None:
     t, w = dash_hover_dash()
     rows = len(mission_of(t, w, plan_with()).items) + 1
     mission_of(t, w, plan_with(max_items=rows))
@@ -99,9 +96,6 @@ def test_what_is_accepted_follows_the_parameters() -> None:
         speed, acceleration = [16, *most][-2:]
         within = {"vehicle.max_speed": speed, "vehicle.max_acceleration": acceleration}
         assert beyond_vehicle(plan.changed(within)) == []
-
-
-def test_what_no_mission_is_made_for_is_refused_before_the_work() -> None:
     (line,) = beyond_vehicle(plan_with(recommend=True, max_speed=25))
     assert line == (
         "plan: vehicle.max_speed: 25 m/s; ArduCopter keeps plans of at most 20 m/s "
@@ -151,32 +145,19 @@ def test_a_mission_goes_around_what_lies_between_home_and_the_route(autopilot: s
     assert speeds[0] == speeds[-1] == 10.0 > max(speeds[1:-1])  # slower on the route alone
 
 
-def test_a_way_that_is_not_needed_is_not_there() -> None:
-    aside = walled(**{"fence.exclusion": [{"center": [150, 200], "radius": 20}]})
-    without = parse_plan(edited(aside.text, {"fence": None}))
-    route = initial_route(T, W, aside)
-    assert assemble(route, aside).items == assemble(route, without).items
-    landing = walled(**{"mission.on_finish": "land"})
-    assert len(way_home(landing, np.array([300.0, 60.0]))) == 0
-    assert len(way_out(landing, np.array([0.0, 60.0]))) == 2
-
-
-def test_homes_and_ways_that_cannot_be_are_named_before_the_work() -> None:
+def test_homes_run_ins_and_ways_that_cannot_be_are_named() -> None:
     wall = {"polygon": [[-400, 15], [400, 15], [400, 30], [-400, 30]]}
     cell = [[-300, -100], [400, -100], [400, 300], [-300, 300]]
     near, inside = ([{"center": [x, 0], "radius": 8}] for x in (10, 5))
     no_way = r"no way leads from home \(site\.origin\) to flight\.start that keeps 4 m "
     no_way += r"\(fence\.margin\).*give a smaller margin, move home"
-    for error, told, zones, cells in (
-        (InputError, r"site\.origin: home, .* 3\.0 m inside exclusion circle.*; move", inside, []),
-        (InputError, r"2\.0 m from exclusion circle, less than fence\.margin", near, []),
-        (InfeasibleError, no_way, [wall], cell),
+    for error, told, zones, inclusion in (
+        (InputError, r"site\.origin: home, .* 3\.0 m inside exclusion circle.*; move", inside, {}),
+        (InputError, r"2\.0 m from exclusion circle, less than fence\.margin", near, {}),
+        (InfeasibleError, no_way, [wall], {"fence.inclusion": cell}),
     ):
         with pytest.raises(error, match=told):
-            check_vehicle(walled(**{"fence.exclusion": zones, "fence.inclusion": cells}))
-
-
-def test_a_run_in_has_to_be_free_as_well() -> None:
+            check_vehicle(walled(**{"fence.exclusion": zones, **inclusion}))
     at_speed = {"flight.start_velocity": [8, 0], "fence.exclusion": [WALL]}
     behind = {"polygon": [[-30, 40], [-10, 40], [-10, 80], [-30, 80]]}
     free, blocked = (
@@ -193,6 +174,13 @@ def test_a_run_in_has_to_be_free_as_well() -> None:
                 InfeasibleError, match=r"before flight\.start.*give flight\.start_v"
             ):
                 assemble(route, plan)
+    aside = walled(**{"fence.exclusion": [{"center": [150, 200], "radius": 20}]})
+    without = parse_plan(edited(aside.text, {"fence": None}))
+    route = initial_route(T, W, aside)
+    assert assemble(route, aside).items == assemble(route, without).items
+    landing = walled(**{"mission.on_finish": "land"})
+    assert len(way_home(landing, np.array([300.0, 60.0]))) == 0
+    assert len(way_out(landing, np.array([0.0, 60.0]))) == 2
 
 
 spots = st.tuples(st.integers(-150, 450), st.integers(-150, 250))

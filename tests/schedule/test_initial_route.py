@@ -1,4 +1,7 @@
-"""The initial route for a trajectory."""
+"""The initial route for a trajectory, and the commands that are found from the flight they make."""
+
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -7,9 +10,15 @@ from hypothesis import strategies as st
 from relay_flights import Trajectory, dash, dash_hover_dash, items_of, plan_with
 
 from faao_mav.arrays import Real
+from faao_mav.autopilot import FlightPath, Flown, Vehicle
+from faao_mav.autopilot.ardupilot.copter import ArduCopter
+from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.schedule.assemble import assemble
+from faao_mav.schedule.prediction import Schedule
 from faao_mav.schedule.route import Route, initial_route
+from faao_mav.schedule.scheduler import CopterScheduler
+from faao_mav.schedule.timing import MOST_LEAD, SHORTEST_HOLD
 from faao_mav.vector import distances_to_path, lengths
 
 STEP = 0.2
@@ -71,7 +80,7 @@ def test_any_flight_keeps_to_its_path(
         assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1.0 + 5e-3 * len(route.speeds))
 
 
-def test_hovers_are_holds() -> None:
+def test_hovers_are_holds_and_a_swing_past_one_belongs_to_it() -> None:
     t, w = dash_hover_dash(hover=40.0)
     route = check(t, w, plan_with())
     assert route.waits.tolist() == [0, 41, 0]  # below 0.75 m/s for half a second on each side
@@ -88,10 +97,7 @@ def test_hovers_are_holds() -> None:
         assert (route.positions.shape, route.waits.tolist()) == ((1, 2), [100])
     route = check(t, np.outer(t / 100, [0.5, 0.0]), plan_with())
     assert len(route.positions) == 2
-
-
-def test_a_swing_past_a_hover_belongs_to_it() -> None:
-    """Such a plan brakes as hard as it may, `far` past the hover, and comes back to it."""
+    # such a plan brakes as hard as it may, `far` past the hover, and comes back to it
     t = np.arange(0, 100, STEP)
     on = dash(0, 200, 8, 2.0, np.maximum(t - 65, 0))
     for far in (1.0, 2.6):
@@ -118,3 +124,80 @@ def test_a_creep_is_short_ways_and_waits_and_so_is_dithering_about_a_place() -> 
     w = np.stack([along + 0.8 * np.sin(angle), 0.8 * np.cos(angle)], axis=-1)
     route = check(t, w, plan_with())
     assert 3 <= route.waits[1:-1].max() <= 9
+
+
+VEHICLE = Vehicle("ardupilot", "copter", {"WPNAV_ACCEL": 400.0, "WPNAV_JERK": 10.0})
+PLACES = np.array([[0.0, 0.0], [120, 0], [240, 60], [240, 200], [100, 200]])
+SPEEDS = np.array([7.0, 4.0, 6.0, 3.0])
+WAITS = np.array([0.0, 0.0, 12.4, 0.0, 3.0])
+
+
+def route_with(speeds: Real, waits: Real) -> Route:
+    still, last = np.zeros(len(waits)), len(waits) - 1
+    return Route(PLACES[: len(waits)], still, still, speeds, waits, still, first=0, last=last)
+
+
+def scheduler_for(t: Real, w: Real) -> CopterScheduler:
+    return CopterScheduler(t, w, VEHICLE, VEHICLE.flight_model(), 0.1, 8.0, tolerance=2.0)
+
+
+def as_planned(route: Route, *, ahead: float = 0.0) -> CopterScheduler:
+    """The flight of `route` as a plan whose clock starts `ahead` seconds into it."""
+    flight = scheduler_for(np.arange(2.0), np.zeros((2, 2))).flight(route).flown
+    t = np.arange(0.0, flight.departures[-1] - ahead, 0.2)
+    w = np.stack([np.interp(t + ahead, flight.t, x) for x in flight.position.T[:2]], axis=-1)
+    return scheduler_for(t, w)
+
+
+def fitted(scheduler: CopterScheduler, begin: Route, **options: Any) -> Schedule:
+    return scheduler.fitted(begin, scheduler.max_speed, **options)
+
+
+GUESS = route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS))
+
+
+def test_commands_leads_groups_bounds_and_holds_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = route_with(SPEEDS, WAITS)
+    found = fitted(as_planned(begin, ahead=0.8), begin).route
+    assert found.lead == pytest.approx(0.8, abs=0.1)
+    assert found.speeds == pytest.approx(SPEEDS, abs=0.1)
+    assert fitted(as_planned(begin, ahead=9.0), begin).route.lead <= MOST_LEAD
+    at_speed = replace(
+        begin, first=1, arrivals=as_planned(begin).flight(begin).flown.arrivals - 0.8
+    )
+    assert fitted(as_planned(begin, ahead=0.8), at_speed).route.lead == 0
+    begin = route_with(SPEEDS, WAITS)
+    speeds = fitted(as_planned(begin), begin, groups=np.array([0, 0, 1, 1])).route.speeds
+    assert speeds[0] == speeds[1] != speeds[2] == speeds[3]
+    narrow = replace(as_planned(begin), min_speed=3.5, max_speed=5.5)
+    speeds = fitted(narrow, route_with(np.full(4, 5.0), WAITS)).route.speeds
+    assert speeds[[0, 3]] == pytest.approx([5.5, 3.5])
+    waits = fitted(as_planned(route_with(SPEEDS, np.zeros(5))), begin).route.waits
+    assert waits[2] == pytest.approx(SHORTEST_HOLD, abs=0.3)
+    assert waits[[0, 1, 3, 4]] == pytest.approx(WAITS[[0, 1, 3, 4]])
+    alone = fitted(
+        scheduler_for(np.arange(5.0), np.zeros((5, 2))), route_with(np.zeros(0), np.array([7.0]))
+    )
+    assert alone.route.waits.tolist() == [7]
+    plan, fly, flights = as_planned(route_with(SPEEDS, WAITS)), ArduCopter.fly, []
+
+    def counted(model: ArduCopter, path: FlightPath) -> Flown:
+        flights.append(path)
+        return fly(model, path)
+
+    monkeypatch.setattr(ArduCopter, "fly", counted)
+    found = fitted(plan, GUESS)
+    assert found.route.speeds == pytest.approx(SPEEDS, abs=0.1)
+    assert found.route.waits == pytest.approx(WAITS, abs=0.5)
+    assert found.route.lead == pytest.approx(0, abs=0.1)
+    assert found.deviation.max < 0.5
+    assert len(flights) <= 6
+
+    # a flight without an end is not the one that fits
+    def followed(model: ArduCopter, path: FlightPath) -> Flown:
+        if not np.allclose(path.speeds, GUESS.speeds):
+            raise InputError("the flight would take more than 21600 s")
+        return fly(model, path)
+
+    monkeypatch.setattr(ArduCopter, "fly", followed)
+    assert fitted(plan, GUESS).route.speeds == pytest.approx(GUESS.speeds)

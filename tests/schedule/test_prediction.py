@@ -51,9 +51,7 @@ def held(solution: Solution, seconds: float = 30.0) -> tuple[Real, Real]:
     return t, np.stack([np.interp(t, solution.t, x) for x in solution.w.T], axis=-1)
 
 
-def test_the_plan_itself_delivers_the_plan_and_another_is_priced_by_slots(
-    solution: Solution,
-) -> None:
+def test_the_plan_itself_delivers_the_plan_and_fresh_fading_too(solution: Solution) -> None:
     found, duration = price_flight(solution, *held(solution)), solution.plan.flight.duration
     assert pytest.approx(solution.I_U, abs=1e-9) == found.I_U
     assert pytest.approx(solution.I_G, abs=1e-9) == found.I_G
@@ -72,6 +70,14 @@ def test_the_plan_itself_delivers_the_plan_and_another_is_priced_by_slots(
         expected = cutoff_rate(H, solution.P_B[..., n, :, :], link.classes, link.noise)
         assert np.mean(expected) == pytest.approx(I_U[n])
     assert np.abs(I_U - solution.I_U).max() > 1e-4
+    fresh = fresh_rates(solution)
+    if solution.plan.radio.fading == "ergodic":
+        assert fresh is not None
+        assert 0 < fresh.delivered_error < 0.1
+        error = 0.1 + 4 * fresh.delivered_error
+        assert fresh.delivered == pytest.approx(solution.delivered_rate, abs=error)
+        assert fresh.delivered <= fresh.average + 1e-9
+        assert f"{fresh.delivered:.4f} +- " in summary(Result(solution, fresh=fresh), verbose=True)
 
 
 def test_a_late_flight_is_told_and_what_serves_it_better(solution: Solution) -> None:
@@ -94,17 +100,6 @@ def test_a_late_flight_is_told_and_what_serves_it_better(solution: Solution) -> 
         assert better[taken_by(solution.plan)] > 0
 
 
-def test_fresh_fading_is_forwarded_too(solution: Solution) -> None:
-    fresh = fresh_rates(solution)
-    if solution.plan.radio.fading == "ergodic":
-        assert fresh is not None
-        assert 0 < fresh.delivered_error < 0.1
-        error = 0.1 + 4 * fresh.delivered_error
-        assert fresh.delivered == pytest.approx(solution.delivered_rate, abs=error)
-        assert fresh.delivered <= fresh.average + 1e-9
-        assert f"{fresh.delivered:.4f} +- " in summary(Result(solution, fresh=fresh), verbose=True)
-
-
 def test_the_table_holds_every_slot(solution: Solution) -> None:
     if solution.P_B.ndim > 3:
         with pytest.raises(InputError, match="csi: statistical"):
@@ -114,7 +109,7 @@ def test_the_table_holds_every_slot(solution: Solution) -> None:
     assert len(rows) == len(solution.t)
     frame = solution.plan.origin.frame
     for n, row in enumerate(rows):
-        assert row.pop("taken_by") == "place"
+        assert row.pop("taken_by") == ("place" if solution.shares is None else "time")
         values = {name: float(value) for name, value in row.items()}
         shares = None if solution.shares is None else pytest.approx(solution.shares[n])
         assert values.get("receive_share") == shares
@@ -133,7 +128,7 @@ COORDINATES = st.floats(-1e4, 1e4)
 PATHS = arrays(float, st.tuples(st.integers(1, 20), st.just(2)), elements=COORDINATES)
 
 
-def test_a_late_flight_is_off_in_time_and_not_in_space() -> None:
+def test_how_far_a_flight_is_in_time_and_in_space() -> None:
     t = np.linspace(0, 10, 101)
     planned = np.column_stack([8 * t, 0 * t])
     longer = np.linspace(0, 12, 121)
@@ -147,9 +142,6 @@ def test_a_late_flight_is_off_in_time_and_not_in_space() -> None:
     found = deviation(t, planned, t, short, 2.0)
     assert found.max == pytest.approx(40)
     assert math.isfinite(found.late)
-
-
-def test_the_path_counts_both_ways_and_to_its_end_at_speed() -> None:
     t = np.arange(3.0)
     straight, bent = (np.array([[0.0, 0], [50, far], [100, 0]]) for far in (0, 7))
     assert deviation(t, straight, t, bent, 1.0).path == pytest.approx(7)

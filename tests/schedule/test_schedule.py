@@ -88,7 +88,7 @@ def test_the_plan_is_kept_in_space_and_time(name: str) -> None:
         assert told["WP_ACC"] > 1.5  # the plan's own limit is not enough for a ramp with jerk
 
 
-def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in() -> None:
+def test_a_plan_at_speed_gets_a_run_in_and_one_that_stays_is_one_hold() -> None:
     (t, w), _, conversion = made("circle")
     route, flown = conversion.schedule.route, conversion.schedule.track()
     assert (route.first, route.last) == (1, len(route.positions) - 2)
@@ -102,6 +102,13 @@ def test_a_plan_that_begins_and_ends_at_speed_gets_a_run_in() -> None:
         assert place == pytest.approx(w[n], abs=1.2)
     assert route.distance == pytest.approx(np.hypot(*np.diff(w, axis=0).T).sum(), rel=0.02)
     assert route.waits[route.first] == route.waits[route.last] == 0
+    t, plan = np.arange(0.0, 60.0, STEP), plan_with(recommend=True)
+    conversion = converted(t, np.full((len(t), 2), 12.5), plan)
+    assert conversion.schedule.deviation.rms == pytest.approx(0, abs=1e-9)
+    assert items_of(conversion.mission, plan)[2] == [pytest.approx(60, abs=2)]
+    for end in ([0.0, 0.0], [0.3, 0.0], [30.0, 0.0]):
+        conversion = converted(np.array([0.0, 10.0]), np.array([[0.0, 0.0], end]), plan)
+        assert math.isfinite(conversion.schedule.deviation.rms)
 
 
 @pytest.mark.parametrize("name", ["dashes", "eight", "circle"])
@@ -135,16 +142,6 @@ def apart(conversion: Conversion, whole: Track, passed: float) -> float:
     start = passed - schedule.flown.departures[schedule.route.first] + schedule.start
     at = [np.interp(schedule.t + start, whole.t, x) for x in whole.position.T[:2]]
     return float(np.hypot(*(np.stack(at, axis=-1) - schedule.positions(schedule.t)).T).max())
-
-
-def test_a_flight_that_stays_is_one_hold_and_two_samples_are_enough() -> None:
-    t, plan = np.arange(0.0, 60.0, STEP), plan_with(recommend=True)
-    conversion = converted(t, np.full((len(t), 2), 12.5), plan)
-    assert conversion.schedule.deviation.rms == pytest.approx(0, abs=1e-9)
-    assert items_of(conversion.mission, plan)[2] == [pytest.approx(60, abs=2)]
-    for end in ([0.0, 0.0], [0.3, 0.0], [30.0, 0.0]):
-        conversion = converted(np.array([0.0, 10.0]), np.array([[0.0, 0.0], end]), plan)
-        assert math.isfinite(conversion.schedule.deviation.rms)
 
 
 @pytest.mark.parametrize("name", ["circle", "px4 dashes"])
@@ -187,7 +184,7 @@ def steps() -> Trajectory:
     return t, np.stack([east, 0 * east], axis=-1)
 
 
-def test_a_change_of_speed_begins_before_the_plans() -> None:
+def test_a_plane_changes_its_speed_before_the_plans_or_is_refused() -> None:
     """The aircraft loses 0.8 m/s in a second at most: with one speed for all it is 25 m rms off."""
     t, w = steps()
     plan = plane_plan(AIRSPEED_CRUISE=22.0)
@@ -198,6 +195,15 @@ def test_a_change_of_speed_begins_before_the_plans() -> None:
     assert found.rms < 5
     assert found.max < 12
     assert abs(found.late) < 0.2
+    for parameters, told in (
+        ({"AIRSPEED_MIN": 12.5}, r"min_speed: 12 m/s; the plane flies 12.92 to 22.74 m/s"),
+        ({"AIRSPEED_MAX": 14.5}, r"max_speed: 16 m/s; the plane flies 9.303 to 14.99 m/s"),
+        ({"NAVL1_PERIOD": 0.0}, "NAVL1_PERIOD: 0"),
+    ):
+        with pytest.raises(InputError, match=told):
+            check_vehicle(plane_plan(**parameters))
+    limits = {"AIRSPEED_MIN": 12 / RATIO, "AIRSPEED_MAX": 16 / RATIO * (1 + 1e-12)}
+    check_vehicle(plane_plan(**limits))
 
 
 def test_a_plane_keeps_the_path_where_plain_waypoints_would_lose_it() -> None:
@@ -223,15 +229,3 @@ def test_a_plane_keeps_the_path_where_plain_waypoints_would_lose_it() -> None:
         else:
             assert (item.command, item.params) == (Command.NAV_WAYPOINT, (0, 0, 0, 0))
     assert flight.parameters == {}
-
-
-def test_a_plane_that_cannot_fly_the_plans_speeds_is_refused() -> None:
-    for parameters, told in (
-        ({"AIRSPEED_MIN": 12.5}, r"min_speed: 12 m/s; the plane flies 12.92 to 22.74 m/s"),
-        ({"AIRSPEED_MAX": 14.5}, r"max_speed: 16 m/s; the plane flies 9.303 to 14.99 m/s"),
-        ({"NAVL1_PERIOD": 0.0}, "NAVL1_PERIOD: 0"),
-    ):
-        with pytest.raises(InputError, match=told):
-            check_vehicle(plane_plan(**parameters))
-    limits = {"AIRSPEED_MIN": 12 / RATIO, "AIRSPEED_MAX": 16 / RATIO * (1 + 1e-12)}
-    check_vehicle(plane_plan(**limits))

@@ -153,7 +153,21 @@ def test_what_is_refused(plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert not (tmp_path / "rows.jsonl").exists()
 
 
-def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> None:
+def test_options_go_before_the_plans_study_and_a_failing_row_is_one(
+    plan: Path, tmp_path: Path
+) -> None:
+    study = {"vary": {"power_dbm": [0, 10]}, "schemes": ["faao"], "seeds": 2}
+    plan.write_text(edited(QUICK, {"study": study}))
+    rows = json.loads(run(plan, "--json", "--jobs", 1).stdout)["rows"]
+    assert [(row["power_dbm"], row["seed"]) for row in rows] == [(0, 0), (0, 1), (10, 0), (10, 1)]
+    other = run(plan, "--power", "5", "--seeds", 1, "--schemes", "zf", "--json", "--jobs", 1)
+    rows = json.loads(other.stdout)["rows"]
+    assert [(row["power_dbm"], row["scheme"], row["seed"]) for row in rows] == [(5, "zf", 0)]
+    plan.write_text(QUICK)
+    vary = "flight.start={latitude: -35.3629, longitude: 149.1652},[0, 50]"
+    result = run(plan, "--vary", vary, "--jobs", 1)
+    assert result.exit_code == 0, result.output
+    assert '{"latitude": -35.3629, "longitude": 149.1652}' in result.stdout
     out = tmp_path / "out"
     result = run(plan, "--vary", "flight.duration=4,10", "--jobs", 1, "--out", out)
     assert result.exit_code == 0, result.output
@@ -167,21 +181,6 @@ def test_a_failing_row_is_a_row_with_its_error(plan: Path, tmp_path: Path) -> No
     assert result.exit_code == 1
     assert "1 of 1 rows failed" in result.stdout
     assert "ergodic" in result.stdout
-
-
-def test_options_go_before_the_plans_study(plan: Path) -> None:
-    study = {"vary": {"power_dbm": [0, 10]}, "schemes": ["faao"], "seeds": 2}
-    plan.write_text(edited(QUICK, {"study": study}))
-    rows = json.loads(run(plan, "--json", "--jobs", 1).stdout)["rows"]
-    assert [(row["power_dbm"], row["seed"]) for row in rows] == [(0, 0), (0, 1), (10, 0), (10, 1)]
-    other = run(plan, "--power", "5", "--seeds", 1, "--schemes", "zf", "--json", "--jobs", 1)
-    rows = json.loads(other.stdout)["rows"]
-    assert [(row["power_dbm"], row["scheme"], row["seed"]) for row in rows] == [(5, "zf", 0)]
-    plan.write_text(QUICK)
-    vary = "flight.start={latitude: -35.3629, longitude: 149.1652},[0, 50]"
-    result = run(plan, "--vary", vary, "--jobs", 1)
-    assert result.exit_code == 0, result.output
-    assert '{"latitude": -35.3629, "longitude": 149.1652}' in result.stdout
 
 
 def test_what_is_no_row_is_refused_by_its_line(whole: Whole, tmp_path: Path) -> None:
@@ -230,9 +229,7 @@ def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
     assert timeless(load_rows(path.parent, CASES)) == timeless(whole[1])
 
 
-def test_rates_and_routes_are_drawn_the_same_each_time(
-    plan: Path, whole: Whole, tmp_path: Path
-) -> None:
+def test_rates_routes_and_causality_are_drawn(plan: Path, whole: Whole, tmp_path: Path) -> None:
     name = "中 $\\frac"
     plan.write_text(edited(QUICK, {"name": name}))
     out = tmp_path / "out"
@@ -262,9 +259,6 @@ def test_rates_and_routes_are_drawn_the_same_each_time(
     assert table(rows).startswith("H,power_dbm,scheme,")
     for empty in (as_array(()), table(()).splitlines()[1:]):
         assert len(empty) == 0
-
-
-def test_what_causality_costs_is_drawn() -> None:
     vary = {"flight.duration": (10, 12), "radio.causal": (True, False)}
     rows = run_study(make_cases(QUICK, vary=vary), jobs=1)
     for planned, paper in zip(rows[::2], rows[1::2], strict=True):

@@ -52,15 +52,12 @@ def test_any_text_is_values_or_a_message(text: str) -> None:
         assert "--power" in str(error)
 
 
-def test_values_are_those_of_yaml() -> None:
+def test_values_are_those_of_yaml_and_others_are_refused() -> None:
     assert parse_values("-40:0:5", "--power") == tuple(range(-40, 1, 5))
     assert parse_values("10:0:-4", "--power") == (10, 6, 2)
     assert parse_values("1, 5:7:1, 2.5", "--power") == (1, 5, 6, 7, 2.5)
     assert parse_vary("flight.start=[0, 350],[0,100]")[1] == ([0, 350], [0, 100])
     assert parse_vary("radio.causal=false,true")[1] == (False, True)
-
-
-def test_what_cannot_be_varied_is_said() -> None:
     for text, part in (
         ("radio.modulation", "key=start:stop:step"),
         ("radio.modulaton=qpsk", "did you mean radio.modulation?"),
@@ -89,7 +86,7 @@ def test_what_cannot_be_varied_is_said() -> None:
         make_cases(SMALL, vary={"radio.seed": tuple(range(MAX_ROWS // 2 + 1))}, seeds=2)
 
 
-def test_schemes_are_methods_precoders_and_inputs() -> None:
+def test_schemes_and_the_grid_of_every_plan_once() -> None:
     assert parse_schemes("faao, zf,faao") == ("faao", "zf")
     with pytest.raises(InputError, match="--schemes rzf: expected some of faao,algorithm1"):
         parse_schemes("faao,rzf")
@@ -99,9 +96,6 @@ def test_schemes_are_methods_precoders_and_inputs() -> None:
     made = [parse_plan(case.text).optimizer for case in cases]
     assert [each.method for each in made] == ["direct", "algorithm1", "direct"]
     assert [each.precoder for each in made] == ["faao", "faao", "mrt"]
-
-
-def test_the_grid_is_every_plan_once() -> None:
     cases = make_cases(
         SMALL,
         vary={"power_dbm": (0, 10), "radio.modulation": ("bpsk", "qpsk")},
@@ -121,9 +115,6 @@ def test_the_grid_is_every_plan_once() -> None:
     wide = make_cases(SMALL, vary={"radio.rician_factor": (1, 2, 3)})
     narrow = make_cases(SMALL + "study: {seeds: 4}\n", vary={"radio.rician_factor": (2,)})
     assert narrow[0].key == wide[1].key
-
-
-def test_the_study_of_a_plan() -> None:
     text = SMALL + "study: {vary: {flight.duration: [10, 12]}, schemes: [faao, zf], seeds: 2}\n"
     study = parse_plan(text).study
     assert study is not None
@@ -162,19 +153,7 @@ def test_no_point_is_better_than_one_of_the_frontier(
     }
 
 
-def test_the_table_has_the_points_of_the_frontier() -> None:
-    plan, key = parse_plan(edited(SMALL, {"radio.bandwidth_mhz": 1})), "flight.duration"
-    rows = [
-        StudyRow("", {key: T}, "faao", 0, delivered=0.5, delivered_mbytes=data, error=error)
-        for T, data, error in ((8.0, 3.0, ""), (9.0, 2.5, ""), (10.0, 4.0, "late"))
-    ]
-    lines = frontier_table(rows, plan, key).splitlines()
-    assert lines[0].split() == ["duration,", "s", "delivered,", "megabytes", "bit/s/Hz"]
-    assert [line.split() for line in lines[1:3]] == [["8", "3", "0.5000"], ["10", "4", "0.5000"]]
-    assert lines[3] == "1 of 3 points failed, first: late"
-
-
-def test_the_cases_end_at_the_plan() -> None:
+def test_a_frontier_ends_at_the_plan_and_is_tabled_and_drawn(tmp_path: Path) -> None:
     plan = parse_plan(edited(SMALL, {"radio.relay.power_dbm": 7.5, "goal": {"maximise": "rate"}}))
     times = [parse_plan(case.text) for case in frontier_cases(plan, "flight.duration", 4)]
     assert [each.flight.duration for each in times][-1] == plan.flight.duration
@@ -185,9 +164,15 @@ def test_the_cases_end_at_the_plan() -> None:
     for text in ("power", "data,power", "mass,data", "power,data,data"):
         with pytest.raises(InputError, match=r"--frontier .*duration,data or power,data"):
             parse_frontier(text)
-
-
-def test_a_frontier_is_drawn_and_told(tmp_path: Path) -> None:
+    plan, key = parse_plan(edited(SMALL, {"radio.bandwidth_mhz": 1})), "flight.duration"
+    rows = [
+        StudyRow("", {key: T}, "faao", 0, delivered=0.5, delivered_mbytes=data, error=error)
+        for T, data, error in ((8.0, 3.0, ""), (9.0, 2.5, ""), (10.0, 4.0, "late"))
+    ]
+    lines = frontier_table(rows, plan, key).splitlines()
+    assert lines[0].split() == ["duration,", "s", "delivered,", "megabytes", "bit/s/Hz"]
+    assert [line.split() for line in lines[1:3]] == [["8", "3", "0.5000"], ["10", "4", "0.5000"]]
+    assert lines[3] == "1 of 3 points failed, first: late"
     plan = tmp_path / "plan.yaml"
     plan.write_text(
         edited(SMALL, {"radio.fading": "none", "radio.bandwidth_mhz": 1, "flight.time_step": 1})
