@@ -103,12 +103,7 @@ def test_floor_and_ceiling_on_a_small_scenario(faint_plan: MakePlan) -> None:
         {"radio.base_station.antennas": 3, "radio.relay.antennas": 3, **KNOWN, **FEW},
         {"radio.base_station.antennas": 1, "flight.duration": 1.5, "flight.end": [0.5, 49.5]},
         {"radio.rician_factor": 0, "flight.start": [0, 0], "flight.end": [0, 0]},
-        {
-            POWERS[0]: 60,
-            POWERS[1]: -70,
-            "optimizer.starts": ["user"],
-            "optimizer.max_iterations": 1,
-        },
+        {POWERS[0]: 60, POWERS[1]: -70, "optimizer.max_iterations": 1},
     ],
 )
 def test_unusual_plans_are_solved(faint_plan: MakePlan, changes: dict[str, Any]) -> None:

@@ -18,7 +18,6 @@ from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.search.starts import starts
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan import Vector
 
 NAMES = ["straight", "bs", "user", "bs-user", "user-bs"]
 PLACES = {"bs": STATIONS[0], "user": STATIONS[1]}
@@ -129,11 +128,6 @@ TURN = math.pi / (1.2 * 0.75 * 17)
 """rad/s: 1.2 look-aheads of ArduPlane's guidance, of NAVL1_DAMPING and NAVL1_PERIOD, a radian."""
 
 
-def turner(duration: float, least: float, wind: Vector = (0.0, 0.0)) -> Kinematics:
-    kin = cruiser(duration, least, max_speed=25.0 + math.hypot(*wind), max_airspeed=25.0)
-    return replace(kin, wind=wind, most_turn=TURN)
-
-
 def turned(solution: Solution) -> Real:
     """Return the shares of what turns may take, in calm air, (N + 1,)."""
     squares = (solution.v**2).sum(axis=1)
@@ -162,7 +156,9 @@ def test_turns_are_as_fast_as_the_guidance_follows(
     rng = np.random.default_rng(0)
     for _ in range(30):
         wind, least = tuple(rng.uniform(-30, 30, 2).tolist()), float(rng.uniform(1, 25))
-        kin, size, theta = turner(2, least, wind), rng.uniform(least, 25, 3), rng.uniform(0, 7, 3)
+        kin = cruiser(2, least, max_speed=25.0 + math.hypot(*wind), max_airspeed=25.0)
+        kin = replace(kin, wind=wind, most_turn=TURN)
+        size, theta = rng.uniform(least, 25, 3), rng.uniform(0, 7, 3)
         x = size[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
         allowed = kin.turn_limits(x + wind)
         assert (kin.in_the_air().turn_limits(x) <= allowed * (1 + 1e-9)).all()

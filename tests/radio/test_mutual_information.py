@@ -64,17 +64,17 @@ def test_between_cutoff_rate_and_ceilings(
 
 
 def test_extremes_the_slope_and_the_spread_over_seeds() -> None:
-    H, P = np.array([[[1.0, 0.3j], [0.2, 1.0]]]), np.eye(2)[None]
+    H, eye = np.array([[[1.0, 0.3j], [0.2, 1.0]]]), np.eye(2)[None]
     for modulation in ("bpsk", "8psk", "16qam"):
         bits = difference_classes(modulation, 2).bits
-        assert mutual_information(H, P, modulation, 1e-9)[0] == pytest.approx(bits, abs=1e-6)
-        assert mutual_information(0 * H, P, modulation, 1.0)[0] == pytest.approx(0.0, abs=1e-12)
+        assert mutual_information(H, eye, modulation, 1e-9)[0] == pytest.approx(bits, abs=1e-6)
+        assert mutual_information(0 * H, eye, modulation, 1.0)[0] == pytest.approx(0.0, abs=1e-12)
         # I = E||H x||² / σ² / ln 2 to first order, BPSK as well
-        weak = mutual_information(H, P, modulation, 1e5)[0]
+        weak = mutual_information(H, eye, modulation, 1e5)[0]
         assert weak == pytest.approx(np.linalg.norm(H) ** 2 / 1e5 / np.log(2.0), rel=0.05)
     with pytest.raises(InputError, match="noise"):
         mutual_information(ONE, ONE, "bpsk", 0.0)
-    # i-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)
+    # I-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)
     H, P, change = channel(6, 1, 1, 2, 2), channel(7, 1, 1, 2, 2), 1e-4 * channel(8, 1, 1, 2, 2)
     errors = np.zeros((1, 1, 2, 2), dtype=np.complex128)
     mutual_information(H, P, "qpsk", 0.75, errors=errors)
@@ -83,11 +83,11 @@ def test_extremes_the_slope_and_the_spread_over_seeds() -> None:
     slope = np.sum((gradient.conj() * change[:, 0]).real)
     assert slope == pytest.approx((up - down) / 2, rel=0.03)
     # beside many times as many noises; more noises err less
-    H, P = np.sqrt(2.0) * channel(4, 32, 2, 2), np.eye(2)[None]
-    exact = mutual_information(H, P, "qpsk", 1.0, nodes=1 << 17).mean()
+    H = np.sqrt(2.0) * channel(4, 32, 2, 2)
+    exact = mutual_information(H, eye, "qpsk", 1.0, nodes=1 << 17).mean()
 
     def means(nodes: int) -> list[float]:
-        every = (mutual_information(H, P, "qpsk", 1.0, nodes=nodes, seed=k) for k in range(8))
+        every = (mutual_information(H, eye, "qpsk", 1.0, nodes=nodes, seed=k) for k in range(8))
         return [float(found.mean()) for found in every]
 
     few, many = means(512), means(1 << 13)

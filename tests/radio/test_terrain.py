@@ -51,7 +51,7 @@ def test_edges_and_the_smooth_earth_lose_what_closed_forms_say() -> None:
     low = np.where(np.abs(SHARE - 0.5) < 1e-9, 0.0, -5.0)  # just below the line: a case of its own
     nu = d**2 / 8 / EARTH * np.sqrt(8 / (wavelength * d))
     assert loss(d, low, (0.0, 0.0), wavelength) == pytest.approx(whole(nu), abs=0.1)
-    # p.526-15 (30), the exact loss, beside (31), its approximation: J(0) is half the field
+    # P.526-15 (30), the exact loss, beside (31), its approximation: J(0) is half the field
     assert knife_edge_loss(np.array(0.0)) == pytest.approx(6.02, abs=0.02)
     nu = np.linspace(-0.7, 8.0, 200)
     S, C = fresnel(nu)
