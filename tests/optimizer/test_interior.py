@@ -262,10 +262,11 @@ def global_optimum(kin: Kinematics, flight: FlightVariables, more: list[Any]) ->
         for c, p in zip(STAGE.constants, STATIONS, strict=True)
     ]
     problem = cp.Problem(cp.Maximize(cp.minimum(*gains)), [*flight.constraints, *more])
+    options: dict[str, Any] = {"solver": cp.CLARABEL, "canon_backend": cp.SCIPY_CANON_BACKEND}
     with suppress(cp.error.SolverError):  # Clarabel stalls on some of these
-        problem.solve(solver=cp.CLARABEL, max_step_fraction=0.95)
+        problem.solve(max_step_fraction=0.95, **options)
         return float(problem.value)
-    problem.solve(solver=cp.CLARABEL, equilibrate_enable=False, max_step_fraction=0.6)
+    problem.solve(equilibrate_enable=False, max_step_fraction=0.6, **options)
     return float(problem.value)
 
 
