@@ -138,7 +138,6 @@ SPREAD: dict[str, Any] = {
     "radio.base_station.power_dbm": 0,
     "radio.relay.power_dbm": 0,
     "flight.duration": 60,
-    "flight.time_step": 1,
     "vehicle.max_speed": 8,
     "vehicle.max_acceleration": 2,
 }
