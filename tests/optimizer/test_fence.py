@@ -99,7 +99,7 @@ def test_a_fenced_solution_is_stationary_and_kept(tmp_path: Path, small_plan: Ma
     again = load_solution(tmp_path / "elsewhere.npz")
     assert again.is_feasible()
     assert again.residuals()["fence"] == 0
-    changes = {
+    tight = {
         "radio.causal": True,
         "radio.duplex": "half",
         "flight.start_velocity": "free",
@@ -107,7 +107,7 @@ def test_a_fenced_solution_is_stationary_and_kept(tmp_path: Path, small_plan: Ma
         "fence": {"margin": 1, "exclusion": [{"center": [22, 22], "radius": 8}]},
         "optimizer": {"starts": ["straight", "user"], "max_iterations": 20},
     }
-    solution = optimize(small_plan(changes))
+    solution = optimize(small_plan(tight))
     assert clearance(solution) >= 1 - 1e-6
     assert solution.is_feasible()
 

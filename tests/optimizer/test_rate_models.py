@@ -70,12 +70,12 @@ def test_the_envelope_theorem_and_tables_of_mutual_information(small_plan: MakeP
     for_it = {"optimizer.rate": "mutual_information", "radio.line_of_sight": "all_ones"}
     plan = small_plan(for_it | {"radio.fading_samples": 2})
     wanted, link = design(plan), build_problem(plan).bs_uav
-    rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
-    assert isinstance(rate, TableRate)
+    table, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
+    assert isinstance(table, TableRate)
     at = link_coordinates(link, w.T)
     H = link.channel(w)
-    P = rate.initial_precoders(*at)
-    assert rate.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
+    P = table.initial_precoders(*at)
+    assert table.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
     differs(link, rate, w)
 
 

@@ -90,18 +90,18 @@ def test_what_is_no_result_is_refused(
     saved = path.read_bytes()
     directory = saved.index(b"PK\1\2")
     for offset, value in ((8, 1), (10, 99), (6, 255)):  # encrypted, packed otherwise, of the future
-        content = bytearray(saved)
-        content[directory + offset] = value  # what the directory says of "t"
-        content[offset - 2] = value  # what the member says of itself
-        path.write_bytes(content)
+        changed = bytearray(saved)
+        changed[directory + offset] = value  # what the directory says of "t"
+        changed[offset - 2] = value  # what the member says of itself
+        path.write_bytes(changed)
         with pytest.raises(InputError, match="not a result of faao-mission --save"):
             load_solution(path)
     with zipfile.ZipFile(path, "w") as packed:  # a directory without an end is not read
         for number in range(3000):
             packed.writestr(f"{number}.npy", b"")
     endless = path.read_bytes()
-    for content in (endless, b"", b"PK\x03\x04 broken", b"\x80\x04N.", b"text"):
-        path.write_bytes(content)
+    for broken in (endless, b"", b"PK\x03\x04 broken", b"\x80\x04N.", b"text"):
+        path.write_bytes(broken)
         with pytest.raises(InputError, match=r"result\.npz: not a result of faao-mission --save"):
             load_solution(path)
     with pytest.raises(InputError, match="cannot be read"):

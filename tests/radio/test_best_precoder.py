@@ -120,10 +120,10 @@ def test_extremes_and_channels_that_lead_nowhere() -> None:
         else:
             np.testing.assert_allclose(rate, difference_classes(modulation, 2).bits, atol=1e-6)
         assert np.all(np.isfinite(best_precoders(H[None], snr, modulation, 1.0)))
-    H: Complex = np.stack([np.zeros((2, 2)), np.eye(2)]).astype(np.complex128)
-    P, _ = best(H, 2.0, "qpsk")
+    dark = np.stack([np.zeros((2, 2)), np.eye(2)]).astype(np.complex128)
+    P, _ = best(dark, 2.0, "qpsk")
     assert P[0] == pytest.approx(np.eye(2))
-    assert best(H, 2.0, "qpsk", start=P)[0][0] == pytest.approx(np.eye(2))
+    assert best(dark, 2.0, "qpsk", start=P)[0][0] == pytest.approx(np.eye(2))
     assert best_precoders(np.empty((0, 1, 2, 2)), 1.0, "qpsk", 1.0).shape == (0, 2, 2)
     # a start that reaches nobody is replaced, not divided by zero
     _, rate = best(np.array([[1.0, 0.0]]), 2.0, "qpsk", start=np.array([[0.0, 0.0], [1.0, 1.0]]))

@@ -88,7 +88,7 @@ def test_sums_over_all_differences(antennas: int, monkeypatch: pytest.MonkeyPatc
     expected = pair_sums("16qam", antennas, Z)
     scale = np.abs(expected).max(axis=1, keepdims=True)
     for block in (1, 1 << 18):
-        monkeypatch.setattr(rate, "_BLOCK", block)
+        monkeypatch.setattr(rate, "CACHE", block)
         found = sums.sums(coordinates(Z), 1 + antennas**2)
         np.testing.assert_allclose(found / scale, expected / scale, rtol=1e-9, atol=1e-10)
         np.testing.assert_allclose(sums.sums(coordinates(Z), 1), found[:, :1], rtol=1e-12)

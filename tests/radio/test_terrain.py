@@ -138,5 +138,7 @@ def test_ridges_clutter_and_unknown_heights(tmp_path: Path) -> None:
     path = tmp_path / "S36W071.hgt"
     path.write_bytes(np.add.outer(-side, side).astype(">i2").tobytes())
     raster = read_raster(path, "heights", 10**7)
-    at = raster.at(np.array([-35.0, -36.0, -35.5, -36.1]), np.array([-71.0, -70.0, -70.25, -70.5]))
-    np.testing.assert_allclose(at, [0, 0, 300, np.nan], atol=1e-6)
+    heights = raster.at(
+        np.array([-35.0, -36.0, -35.5, -36.1]), np.array([-71.0, -70.0, -70.25, -70.5])
+    )
+    np.testing.assert_allclose(heights, [0, 0, 300, np.nan], atol=1e-6)

@@ -47,8 +47,8 @@ def test_the_items_of_a_mission() -> None:
     t, w = dash_hover_dash()
     rows = len(mission_of(t, w, plan_with()).items) + 1
     mission_of(t, w, plan_with(max_items=rows))
-    expected = rf"needs {rows} items .*max_items is {rows - 1}; raise .*path_tolerance \(now 2 m\)"
-    with pytest.raises(InfeasibleError, match=expected):
+    told = rf"needs {rows} items .*max_items is {rows - 1}; raise .*path_tolerance \(now 2 m\)"
+    with pytest.raises(InfeasibleError, match=told):
         mission_of(t, w, plan_with(max_items=rows - 1))
 
 

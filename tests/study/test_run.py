@@ -252,11 +252,11 @@ def test_rates_routes_and_causality_are_drawn(plan: Path, whole: Whole, tmp_path
         with pytest.raises(InputError, match="nothing to draw"):
             study_figure(rows, parse_plan(QUICK), kind)
     # rows of several studies or of none are one table
-    rows = [StudyRow("", {"end": [1, 2]}, "faao", 0), StudyRow("", {"end": [3, 4]}, "zf", 0)]
-    assert as_array(rows)["end"].tolist() == [[1, 2], [3, 4]]
-    rows = [StudyRow("", {"H": 60}, "faao", 0), StudyRow("", {"power_dbm": 5}, "zf", 0)]
-    assert np.isnan(as_array(rows)["H"]).tolist() == [False, True]
-    assert table(rows).startswith("H,power_dbm,scheme,")
+    ends = [StudyRow("", {"end": [1, 2]}, "faao", 0), StudyRow("", {"end": [3, 4]}, "zf", 0)]
+    assert as_array(ends)["end"].tolist() == [[1, 2], [3, 4]]
+    several = [StudyRow("", {"H": 60}, "faao", 0), StudyRow("", {"power_dbm": 5}, "zf", 0)]
+    assert np.isnan(as_array(several)["H"]).tolist() == [False, True]
+    assert table(several).startswith("H,power_dbm,scheme,")
     for empty in (as_array(()), table(()).splitlines()[1:]):
         assert len(empty) == 0
     vary = {"flight.duration": (10, 12), "radio.causal": (True, False)}

@@ -153,7 +153,7 @@ def test_no_point_is_better_than_one_of_the_frontier(
     }
 
 
-def test_a_frontier_ends_at_the_plan_and_is_tabled_and_drawn(tmp_path: Path) -> None:
+def test_a_frontier_ends_at_the_plan_and_is_a_table() -> None:
     plan = parse_plan(edited(SMALL, {"radio.relay.power_dbm": 7.5, "goal": {"maximise": "rate"}}))
     times = [parse_plan(case.text) for case in frontier_cases(plan, "flight.duration", 4)]
     assert [each.flight.duration for each in times][-1] == plan.flight.duration
@@ -173,6 +173,9 @@ def test_a_frontier_ends_at_the_plan_and_is_tabled_and_drawn(tmp_path: Path) -> 
     assert lines[0].split() == ["duration,", "s", "delivered,", "megabytes", "bit/s/Hz"]
     assert [line.split() for line in lines[1:3]] == [["8", "3", "0.5000"], ["10", "4", "0.5000"]]
     assert lines[3] == "1 of 3 points failed, first: late"
+
+
+def test_a_frontier_is_drawn_by_the_command(tmp_path: Path) -> None:
     plan = tmp_path / "plan.yaml"
     plan.write_text(
         edited(SMALL, {"radio.fading": "none", "radio.bandwidth_mhz": 1, "flight.time_step": 1})
