@@ -124,3 +124,5 @@ def test_energy_is_the_integral_of_power() -> None:
     assert used(3.0).total == pytest.approx(found.total)  # carried along by it
     assert found.left == pytest.approx(1 - found.total / 4)
     assert found.as_dict()["reserve"] == pytest.approx(0.3)
+    assert found.as_dict()["used_wh"] == found.total
+    assert found.as_dict()["mean_power_w"] == pytest.approx(by_hand / 50, rel=1e-3)

@@ -272,4 +272,7 @@ def test_what_a_format_cannot_hold_is_told() -> None:
         )),
     ):  # fmt: skip
         assert render_files(mission, name, target).lost == lost
+    plain = replace(READ, items=(PLACE,), rally=(RallyPoint(1.0, 2.0, 3.0),))
+    said, _ = render_files(plain, "x.kml").lost  # nothing of terrain and splines
+    assert said == "KML holds no rally points: 1 point left out"
     assert read_qgc_plan(write_qgc_plan(nowhere)).mission.unread == ("fence",)

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as arrays
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.gain_map import GainMap
-from faao_mav.radio.map_file import WORD, map_archive, map_of_word, map_word, read_map
+from faao_mav.radio.map_file import WORD, map_archive, map_of_word, map_word, read_map, read_raster
 
 EAST, NORTH = np.arange(0.0, 50.0, 10.0), np.arange(-20.0, 60.0, 20.0)
 SOUND: dict[str, Any] = {"east": EAST, "north": NORTH, "gain_db": np.full((4, 5), -90.0)}
@@ -172,6 +172,9 @@ def test_a_geotiff_of_any_projection_becomes_a_local_grid(tmp_path: Path) -> Non
         off = found.db[0] + 90.0 - 1e3 * (latitude - 47.0) + 500 * (longitude - 8.0)
         assert np.isnan(off).any()
         assert np.nanmax(np.abs(off[3:-3, 3:-3])) < 1e-3  # at the edge it is the nearest cell's
+        assert read_raster(path, "a map", 7_200).values.shape == (80, 90)
+        with pytest.raises(InputError, match=r"90 x 80 cells, .* at most 7,199 cells"):
+            read_raster(path, "a map", 7_199)
         told |= {"count": 2, "crs": None}
     with rasterio.open(path, "w", driver="GTiff", width=9, height=8, **told) as file:
         file.write(np.zeros((2, 8, 9)))

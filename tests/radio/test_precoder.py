@@ -101,6 +101,9 @@ def test_channels_agree_with_positions_powers_and_limits() -> None:
     few = balanced_rayleigh(np.random.default_rng(3), 4, 2, 3)
     assert np.abs(few.mean(axis=0)).max() < 1e-12
     assert np.mean(np.abs(few) ** 2) == pytest.approx(1.0)
+    fewer = balanced_rayleigh(np.random.default_rng(3), 3, 2, 3)  # too few for the rotations
+    scaled = fewer / rayleigh(np.random.default_rng(3), 3, 2, 3)
+    assert np.abs(scaled - scaled[0, 0, 0]).max() < 1e-12
     nlos = rayleigh(np.random.default_rng(5), 4, 2, 2)
     los = np.ones((2, 2))
     np.testing.assert_array_equal(rician(los, nlos, np.inf), np.broadcast_to(los, nlos.shape))

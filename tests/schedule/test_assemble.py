@@ -167,6 +167,7 @@ def test_homes_run_ins_and_ways_that_cannot_be_are_named() -> None:
         route = initial_route(T, W, plan)
         route = with_run_in(route, T, W, plan.aircraft.flight_model(), 8.0)
         assert route.first == 1
+        assert route.waits[0] == route.radii[0] == 0
         if plan is free:
             assert assemble(route, plan).items
         else:

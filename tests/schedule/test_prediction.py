@@ -173,3 +173,9 @@ def test_the_distance_to_a_path_is_the_least_to_a_leg(points: np.ndarray, path: 
     legs = list(zip(path, [*path[1:], path[-1]], strict=True))
     expected = np.min([distances_to_segment(points, a, b) for a, b in legs], axis=0)
     assert distances_to_path(points, path) == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_way_before_the_plan_begins_does_not_count() -> None:
+    t = np.arange(-20.0, 21.0)
+    w = np.column_stack([np.where(t < 10, t, 20 - t), 0 * t])  # w_F, at 0, is passed twice
+    assert lateness(t[20:], w[20:], t + 0.5, w, 2.0) == 0.5

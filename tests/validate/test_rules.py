@@ -83,6 +83,10 @@ def test_a_route_beyond_what_the_gain_was_measured_at_is_told() -> None:
     assert text.startswith(f"the route is {d[0]:.0f} to {d[-1]:.0f} m from the ground user; ")
     both = told("gain", elevation_deg=[0, 1], distance_m=[1e4, 1e5])
     assert ["base station" in text for text in both] == [True, True, False, False]
+    assert told(hop, distance_m=[0.1, d[-3] / 1.05 + least]) == ()
+    assert told(hop, distance_m=[0.1, d[-3] / 1.05 - least])
+    assert told(hop, elevation_deg=[angle[2] + 1 - least, 90]) == ()
+    assert told(hop, elevation_deg=[angle[2] + 1 + least, 90])
 
 
 def test_the_airframe_decides_what_leaning_gives() -> None:
@@ -115,6 +119,10 @@ def test_what_findings_say() -> None:
     assert found.action == "latitude and longitude look exchanged: correct them"
     (found,) = given("px4 square:100,50.1 takeoff return").by("fence-home")
     assert "PX4 says so (Geofence invalid), and flies the mission all the same" in found.message
+    (found,) = given("px4 waypoint:0,9,9 takeoff").by("px4-takeoff-first")
+    assert f"{found.message}: {found.action}".count("item 1") == 2
+    (found,) = given("copter square:100 takeoff return").by("fence-not-kept")
+    assert found.action == "set FENCE_ENABLE to 1 for the vehicle to turn back"
 
 
 def test_rules_of_the_other_autopilot_are_silent_and_all_say_what_to_do() -> None:
