@@ -27,7 +27,10 @@ def _beside(context: ValidationContext) -> Hits:
     if context.items and home is None:
         yield hit("no-home")
     if home is not None and not bound.lowest_land <= home.altitude <= bound.highest_land:
-        yield hit("home-height", home=home)
+        told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
+        if math.isnan(home.altitude):
+            told = "the file has no height of home: heights above sea level are not checked"
+        yield hit("home-height", told=told)
     for n, point in enumerate(context.mission.rally, start=1):
         if math.isnan(point.altitude):
             yield hit("rally-height", place=f"rally point {n}")
@@ -106,25 +109,38 @@ def _refused(context: ValidationContext) -> Hits:
         yield hit(rule, rows=rows, fit=dialect.items, room=room)
 
 
-_YAW = 3  # The parameter of a waypoint that is its yaw, counted from 0.
+_YAW = 3
+_WAYPOINT = {
+    1: (" (acceptance radius)", "set WPNAV_RADIUS (WP_RADIUS_M), which holds for all waypoints"),
+    2: (" (pass-by radius)", ""),
+    _YAW: (" (yaw)", "put a CONDITION_YAW before the waypoint"),
+}
+"""Parameters of a waypoint, counted from 0, and what to do for them where the vehicle hovers."""
 
 
 @checks
 def _stored(context: ValidationContext) -> Hits:
     """What the vehicle's storage loses."""
     found: dict[tuple[int, int], list[tuple[int, float, float]]] = {}
+    hovers = context.vehicle.type.hovers
     for k, item, stored in context.stored:
         for n, (value, kept) in enumerate(zip(item.params, stored.params, strict=True)):
             turned = n == _YAW and _same(value % 360, kept)
             if _same(value, kept) or turned or item.command not in FLOWN_TO:
                 continue
             if n == 0 and item.command in HOLDING:
-                yield hit("hold-changed", k, kept=kept)
+                instead = "use whole seconds from 0 to 65535, or a NAV_DELAY after a plain waypoint"
+                if item.command == Command.NAV_WAYPOINT and not hovers:
+                    instead = "use NAV_LOITER_TIME: a plane waits in a circle"
+                yield hit("hold-changed", k, kept=kept, instead=instead)
             elif value != 0:
                 found.setdefault((item.command, n), []).append((k, value, kept))
-    for (_, n), [(k, value, kept), *rest] in found.items():
+    for (command, n), [(k, value, kept), *rest] in found.items():
         more = f", and so in {len(rest) + 1} items" if rest else ""
-        yield hit("value-dropped", k, n=n + 1, value=value, kept=kept, more=more)
+        meaning, do = _WAYPOINT.get(n, ("", "")) if command == Command.NAV_WAYPOINT else ("", "")
+        told = {"value": value, "kept": kept, "meaning": meaning, "more": more}
+        told["instead"] = (hovers and do) or "write what can be stored"
+        yield hit("value-dropped", k, n=n + 1, **told)
 
 
 def _same(value: float, kept: float) -> bool:

@@ -151,9 +151,12 @@ def _px4_takeoff(context: ValidationContext) -> Hits:
     """Where the take-off stands, where it leads, and whether there has to be one."""
     takeoffs = [k for k, _ in context.each(*TAKEOFFS)]
     before = next((k for k, item in enumerate(context.items) if item.command in FLIES), 0)
+    which, instead = "the take-off comes", f"move it before item {before + 1}"
+    if before in takeoffs:
+        which, instead = "a second take-off,", "remove it"
     for k in takeoffs:
         if before < k:
-            yield hit("px4-takeoff-first", k, before=before + 1)
+            yield hit("px4-takeoff-first", k, which=which, before=before + 1, instead=instead)
     radius, radius_name = context.parameter("acceptance_radius")
     first, height_name = context.parameter("takeoff_height")
     told = {"radius": radius_name, "height": height_name, "old": radius + 1, "first": first}
@@ -167,11 +170,12 @@ def _px4_takeoff(context: ValidationContext) -> Hits:
         if away and context.items[place.index].command == Command.NAV_TAKEOFF:
             yield hit("px4-takeoff-elsewhere", place.index, place=place)
     required = int(context.value("takeoff_land_required", 0))
-    takeoff, landing = bool(takeoffs), any(context.each(Command.NAV_LAND))
-    both = takeoff == landing  # 5 asks for both on the ground, in the air for what 2 does
-    there = {1: takeoff, 2: landing, 3: takeoff and landing, 4: both, 5: both}
-    if not there.get(required, True):
-        yield hit("px4-takeoff-or-landing-missing", required=required)
+    has = {"NAV_TAKEOFF": bool(takeoffs), "NAV_LAND": any(context.each(Command.NAV_LAND))}
+    both = list(has)
+    # 4 asks for both or neither; so does 5 on the ground, in the air for what 2 does
+    asked = {1: both[:1], 2: both[1:], 3: both} | dict.fromkeys((4, 5), both * any(has.values()))
+    if missing := " and ".join(name for name in asked.get(required, ()) if not has[name]):
+        yield hit("px4-takeoff-or-landing-missing", required=required, missing=missing)
 
 
 @checks
@@ -206,15 +210,16 @@ def _land_start(context: ValidationContext) -> Hits:
     starts = [k for k, _ in context.each(Command.DO_LAND_START)]
     for second in starts[1:]:
         what = f"a second DO_LAND_START, after item {starts[0] + 1}"
-        yield hit("px4-land-start", second, what=what)
+        yield hit("px4-land-start", second, what=what, instead="remove it")
     for start in starts[:1]:
         what = f"a return to launch after the DO_LAND_START of item {start + 1}"
         for k, _ in context.each(Command.NAV_RETURN_TO_LAUNCH):
             if k > start:
-                yield hit("px4-land-start", k, what=what)
+                yield hit("px4-land-start", k, what=what, instead="remove one of both")
         # The landing's approach, the item before it, may be the DO_LAND_START itself.
         if not any(k - 1 >= start for k, _ in context.each(*LANDINGS)):
-            yield hit("px4-land-start", start, what="there is no landing after DO_LAND_START")
+            what = "there is no landing after DO_LAND_START"
+            yield hit("px4-land-start", start, what=what, instead="add NAV_LAND, or remove it")
 
 
 def _radii(context: ValidationContext) -> Iterator[tuple[Straight, float]]:

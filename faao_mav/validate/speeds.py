@@ -90,19 +90,22 @@ def _slow(context: ValidationContext) -> Hits:
             continue
         legs, reached = zip(*run, strict=True)
         mean, commanded = float(np.mean(reached)), float(np.mean([leg.speed for leg in legs]))
-        told = {"last": legs[-1].index + 1, "asked": max(leg.speed for leg in legs)}
-        told["legs"] = counted(len(legs), "leg")
+        told = {"asked": max(leg.speed for leg in legs)}
         lost = sum(
             leg.length * (1 / max(v, bound.slowest) - 1 / leg.speed)
             for leg, v in zip(legs, reached, strict=True)
         )
         if len(legs) >= bound.crawl_legs and 100 * mean < bound.crawl * commanded:
             spacing = float(np.mean([leg.length for leg in legs]))
-            yield hit("crawl", legs[0].index, spacing=spacing, mean=mean, **told)
+            told |= {"count": len(legs), "last": legs[-1].index + 1, "spacing": spacing}
+            yield hit("crawl", legs[0].index, mean=mean, **told)
         # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
         elif lost >= bound.time_lost and context.link is None:
-            least, most = min(reached), max(reached)
-            yield hit("speed-not-reached", legs[0].index, least=least, most=most, **told)
+            where = f"on this leg of {legs[0].length:.0f} m"
+            if len(legs) > 1:
+                where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
+            span = " to ".join(dict.fromkeys(f"{each(reached):.1f}" for each in (min, max)))
+            yield hit("speed-not-reached", legs[0].index, where=where, span=span, **told)
 
 
 def _reached_speeds(context: ValidationContext) -> Iterator[tuple[Straight, float]]:

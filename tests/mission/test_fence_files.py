@@ -1,6 +1,8 @@
-"""Fences from KML and GeoJSON: whether a zone is one to stay in or out of above all."""
+"""Fences from KML, KMZ and GeoJSON: whether a zone is one to stay in or out of above all."""
 
+import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -156,3 +158,22 @@ def test_what_is_no_fence_is_refused_with_its_place(tmp_path: Path) -> None:
     (tmp_path / "b.GeoJSON").write_text(json.dumps(feature("Polygon", [SQUARE], {"name": "field"})))
     assert len(read_fence(tmp_path / "b.GeoJSON").polygons) == 1
     assert len(read_fence(DATA / "missions" / "fence_and_rally.plan").circles) == 1
+
+
+def test_kmz_is_the_kml_in_an_archive() -> None:
+    def kmz(name: str, text: str) -> bytes:
+        archive = io.BytesIO()
+        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+            file.writestr("files/picture.png", b"")
+            file.writestr(name, text)
+        return archive.getvalue()
+
+    assert kml_fence(kmz("doc.KML", KML)) == kml_fence(KML.encode())
+    for content, told in (
+        (kmz("doc.kml", KML)[:60], "not a KMZ archive"),
+        (b"PK\3\4", "not a KMZ archive"),
+        (kmz("doc.txt", KML), r"with a \.kml file"),
+        (kmz("doc.kml", " " * 10_000_000), "larger than 4,000,000 bytes"),
+    ):
+        with pytest.raises(MissionFileError, match=told):
+            kml_fence(content)

@@ -1,11 +1,13 @@
-"""Fences from files: QGroundControl's `.plan`, and the polygons that KML and GeoJSON draw.
+"""Fences from files: QGroundControl's `.plan`, and the polygons that KML, KMZ and GeoJSON draw.
 
 A drawn polygon is a zone to stay in or out of, as words tell. Nobody is let fly into a zone for
 want of a word: a polygon whose words tell neither, or both, is an error that says how to tell.
 Sources: OGC KML 2.3 (07-147r2), Polygon, ExtendedData; RFC 7946.
 """
 
+import io
 import re
+import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -68,14 +70,14 @@ def read_fence(path: Path) -> Fence:
     match path.suffix.lower():
         case ".plan":
             fence = read_mission(path).fence
-        case ".kml":
+        case ".kml" | ".kmz":
             content = read_bytes(path, MAX_BYTES, "a fence", MissionFileError)
             fence = naming(path, lambda: kml_fence(content))
         case ".geojson" | ".json":
             text = read_text(path, MAX_BYTES, "a fence", MissionFileError)
             fence = naming(path, lambda: geojson_fence(text))
         case suffix:
-            expected = "expected a .plan, .kml or .geojson file; a .kmz is a .kml in a ZIP archive"
+            expected = "expected a .plan, .kml, .kmz or .geojson file"
             raise MissionFileError(f"{path}: {suffix or 'no ending'}; {expected}")
     if not fence:
         raise MissionFileError(f"{path}: holds no fence; expected polygons")
@@ -113,11 +115,21 @@ def _of_geojson(
 
 
 def kml_fence(content: bytes) -> Fence:
-    """Return the fence that a KML file draws.
+    """Return the fence that a KML file draws, or a KMZ archive that holds one.
 
     The polygons of a placemark are one zone; its name, description and ExtendedData, and the names
     of the folders around it, say which kind.
     """
+    if content.startswith(b"PK\x03\x04"):
+        try:
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                names = [name for name in archive.namelist() if name.casefold().endswith(".kml")]
+                content = archive.open(names[0]).read(MAX_BYTES + 1)
+        except Exception as error:  # whatever the libraries of an archive's methods raise
+            told = f"not a KMZ archive with a .kml file that can be read: {shortened(str(error))}"
+            raise MissionFileError(told) from None
+        if len(content) > MAX_BYTES:
+            raise MissionFileError(f"the .kml file in it is larger than {MAX_BYTES:,} bytes")
     return fence_of(_of_kml(xml_tree(content), ()))
 
 
