@@ -143,3 +143,17 @@ def test_worst_first_then_by_item_and_nothing_of_a_sound_mission() -> None:
     way = "waypoint:0,100,30,6 waypoint:100,150,30 waypoint:200,160,30,10"
     for vehicle in ("copter", "px4", "px4 GF_MAX_HOR_DIST=nan"):  # which counts as not given
         assert validate(given(f"{vehicle} takeoff change_speed=1,8,-1 {way} return")) == ()
+
+
+def test_what_is_missing_to_px4_is_named() -> None:
+    for items, missing in (
+        ("MIS_TKO_LAND_REQ=2 waypoint:0,9,9", "NAV_LAND"),
+        ("MIS_TKO_LAND_REQ=3 waypoint:0,9,9", "NAV_TAKEOFF and NAV_LAND"),
+        ("MIS_TKO_LAND_REQ=4 waypoint:0,9,9 land", "NAV_TAKEOFF"),
+    ):
+        (found,) = given(f"px4 {items}").by("px4-takeoff-or-landing-missing")
+        assert found.action == f"add {missing}, or change MIS_TKO_LAND_REQ"
+    (second,) = given("px4 takeoff waypoint:0,9,9 takeoff").by("px4-takeoff-first")
+    assert second.action == "remove it"
+    (unknown,) = given("copter home=47,8,nan takeoff").by("home-height")
+    assert unknown.message.startswith("the file has no height of home")
