@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from served import HOME, vehicle
 from typer.testing import CliRunner
 
-from faao_mav.autopilot import autopilots, kinds
+from faao_mav.autopilot import Vehicle, autopilots, kinds
 from faao_mav.cli.main import app
 from faao_mav.mission.fence import Circle, Fence
 from faao_mav.mission.formats import read_mission, read_mission_file, write_mission
@@ -107,7 +107,8 @@ def test_one_pass_through_every_command(plan: Path, out: Path, tmp_path: Path) -
         radio.bind(("127.0.0.1", 0))
         assert record("upload", out, "--to", to)["verified"] is True
         assert run("download", "--from", to, "--out", back).exit_code == 0
-        assert len(read_mission(back).items) == told["mission"]["items"]
+        stored = map(Vehicle("ardupilot").type.dialect.stored, read_mission(out).items)
+        assert read_mission(back).items == tuple(stored)
         port = radio.getsockname()[1]
         flown = run("fly", out, "--to", to, "--solution", save, "--arm", "--stream", "--json",
                     "--log", log, "--radio", f"udp:127.0.0.1:{port}")  # fmt: skip
@@ -115,7 +116,7 @@ def test_one_pass_through_every_command(plan: Path, out: Path, tmp_path: Path) -
         slots = []  # on a busy machine not all of the 32 are told
         while select.select([radio], [], [], 0.1)[0]:
             slots.append(json.loads(radio.recv(65_536))["slot"])
-    assert slots == sorted(set(slots))
+    assert all(slot != then for slot, then in pairwise(slots))  # back if it is led back
     assert len(slots) > 4
     *lines, end = map(json.loads, flown.stdout.splitlines())
     assert (end["ending"], slots[0]) == ("finished", 0)

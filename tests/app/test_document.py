@@ -69,7 +69,7 @@ def test_what_plans_do_not_hold_is_kept_as_text_and_told_as_the_command_line_doe
         parse_plan(document.text, "plan.yaml")
     told = problems_of(str(error.value), "plan.yaml", [*reference()])
     assert told.keys() == {"flight.start"}
-    assert told["flight.start"].startswith("'[0, 3': not two numbers")
+    assert told["flight.start"].startswith("'[0, 3': not two finite numbers")
     assert str(error.value) == f"plan.yaml: flight.start: {told['flight.start']}"
 
 

@@ -170,6 +170,9 @@ def test_a_wide_radius_before_a_small_one_costs_speed() -> None:
         speed = np.linalg.norm(flown.velocity[about], axis=1).min()
         assert speed == pytest.approx(slowest, abs=0.5)
     assert SUITED.radii(np.ones(2), np.zeros(2), np.ones(2, dtype=bool)).min() >= 1  # a metre
+    ways = np.array([99.0, 99.0, 4.0]), np.array([0.0, 0.3, 0.0]), np.array([True, False, True])
+    _, corner, after = SUITED.radii(*ways)
+    assert corner <= after  # PX4 would first fly back
 
 
 @settings(max_examples=8)
@@ -200,3 +203,7 @@ def test_airspeed_is_held_within_its_limits_and_higher_in_thin_air() -> None:
             assert speed == pytest.approx(held * ratio, rel=2e-3)
     climb = PLANE.fly(path_of([0, 100, 1500], 15.0, heights=[50, 200, 200])).velocity[:, 2]
     assert np.median(climb[climb > 1]) == pytest.approx(5, abs=0.5)  # as fast as it may
+    rates = ArduPlane(cruise_speed=22.0).speed_rates  # of the demand, as its log shows
+    assert (rates.fall, rates.power / 17.7) == pytest.approx((0.80, 1.38), abs=0.01)
+    rates = ArduPlane(cruise_speed=16.0, descent_speed=3.0).speed_rates
+    assert rates.fall == pytest.approx(1.65, abs=0.01)

@@ -322,7 +322,7 @@ class Judge(Counted):
         self.wrong, self.setpoints = list[str](), list[tuple[float, float]]()
         self._told: messages.GlobalPositionInt | None = None
         self._mode: int | None = None
-        self._ordered, self._pilots = False, False
+        self._ordered, self._pilots, self._asked_at = False, False, 0.0
 
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
         if envelope.sender == VEHICLE:
@@ -330,7 +330,13 @@ class Judge(Counted):
         return self._judged(super().on(envelope, now), now)
 
     def tick(self, now: float) -> Sequence[Message]:
-        return self._judged(super().tick(now), now)
+        sent, watch = self._judged(super().tick(now), now), self.machine
+        unsure = watch.streams and watch._unsure_since is not None
+        if watch.outcome is not None or not watch._is_to_hold or unsure:
+            self._asked_at = now
+        elif now > self._asked_at + 2.1:
+            self.wrong.append(f"{now:.1f} s: the hold is not asked for any more")
+        return sent
 
     def interrupt(self, now: float) -> None:
         """Press Ctrl-C; what is sent then is lost at first."""
@@ -351,7 +357,7 @@ class Judge(Counted):
         for message in sent:
             if harmless(message):
                 continue
-            self._ordered = True
+            self._ordered, self._asked_at = True, now
             if arms(message, 1.0) and not self.may_start:
                 self.wrong.append(f"{now:.1f} s: armed")
             if self._pilots:

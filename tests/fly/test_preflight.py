@@ -42,6 +42,7 @@ from faao_mav.wire import upload
 from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
 from faao_mav.wire.protocol import GROUND_STATION, MissionType
 from faao_mav.wire.transfer import PartReport
+from faao_mav.wire.whereabouts import Whereabouts
 
 LEVELS = {"errs": Level.ERROR, "warns": Level.WARNING, "notes": Level.NOTE}
 PLACES = {
@@ -252,6 +253,8 @@ def test_nothing_is_armed_past_the_gate_but_what_an_option_overrules(mission: Pa
         end = json.loads(result.stdout.splitlines()[-1])
         (here,) = (each for each in end["findings"] if each["rule"] == "place-home")
         assert (here["level"], here["action"]) == ("warning", "--elsewhere: flown all the same")
+    stands = [Whereabouts(19.9, up, None).is_meant for up in (9.9, -10.1, 10.1, None)]
+    assert stands == [True, False, False, True]
     with vehicle(place=1e9) as (to, _):
         told = run("upload", mission, "--to", to).stdout
         assert "stands       not known how far from the mission's home" in told

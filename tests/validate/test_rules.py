@@ -36,6 +36,8 @@ def test_every_rule_is_tried_and_can_be_cited() -> None:
     for rule in RULES:
         assert rule.summary
         assert rule.source
+        assert rule.id.replace("-", "").isalnum()  # as users' programs know it
+        assert rule.id == rule.id.lower().strip("-")
 
 
 def test_a_doubtful_radio_is_told_with_the_likely_slip() -> None:

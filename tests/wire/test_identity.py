@@ -2,6 +2,7 @@
 
 import time
 from collections import defaultdict
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 from stations import HOME, VEHICLE, Air, Desk, a_mission, hurry, rows_for
+from test_client import logged
 
 from faao_mav.errors import LinkError
 from faao_mav.fly.fly import fly_mission
@@ -166,7 +168,9 @@ def test_nothing_is_started_that_has_a_namesake(monkeypatch: pytest.MonkeyPatch)
     assert not mock.armed
 
 
-def test_what_comes_later_from_elsewhere_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_comes_later_from_elsewhere_does_not_count(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """A vehicle that is chosen, and then another that answers everything in its name, first."""
     mock, notes = a_mock(rate=0.0), list[str]()
     vehicles = {HERE: mock}
@@ -177,8 +181,11 @@ def test_what_comes_later_from_elsewhere_does_not_count(monkeypatch: pytest.Monk
             del vehicles[HERE]
             vehicles.update({ELSEWHERE: a_mock(rate=0.0), HERE: mock})
 
-    report = upload(a_mission(5), TO, observe=observe, note=notes.append)
+    log = tmp_path / "x.tlog"
+    report = upload(a_mission(5), TO, observe=observe, note=notes.append, log=log)
     assert report.verified
+    told = [each.get_srcSystem() for each in logged(log) if each.get_type() == "MISSION_COUNT"]
+    assert told.count(1) == 1  # of what it was asked to give, by one vehicle
     assert len(mock.mission().items) == 5
     assert {to for data, to in air.sent if message_id(data) != 111} == {HERE}  # not TIMESYNC
     (note,) = notes
