@@ -79,7 +79,10 @@ class Manners:
 
 
 def meanings_of(autopilot: str) -> dict[str, str]:
-    """Return what the table `meanings.tsv` says of the results of an `autopilot`."""
+    """Return what the table `meanings.tsv` says of the results of an `autopilot`.
+
+    Those of "any" have that meaning where it has none of its own; "order" has the MAV_RESULT.
+    """
     told = (row for row in table("autopilot/meanings.tsv") if row["autopilot"] == autopilot)
     return {row["result"]: row["means"] for row in told}
 

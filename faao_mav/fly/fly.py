@@ -93,7 +93,8 @@ def fly_mission(
         # A vehicle that flies already is not judged, and not kept busy.
         judged = arm or flight.streamed or not vehicle.armed
         asked = tuple(MissionType if judged else lists)
-        held, wrong = session.run(read_held(peer, asked, parameters=judged)), list[Difference]()
+        held = session.run(read_held(peer, asked, parameters=judged, home=judged))
+        wrong = list[Difference]()
         for part, sent in lists.items():
             if part in held.missing:
                 raise LinkError(f"{connection}: {session.not_read(held.missing[part])}")

@@ -141,14 +141,18 @@ class Held:
 
 
 def read_held(
-    peer: Peer, parts: Sequence[MissionType] = tuple(MissionType), *, parameters: bool = True
+    peer: Peer,
+    parts: Sequence[MissionType] = tuple(MissionType),
+    *,
+    parameters: bool = True,
+    home: bool = True,
 ) -> Talk[Held]:
     """Read the lists `parts` of the vehicle of `peer`, each that comes.
 
     A vehicle that has no fence or rally points at all is one that has none stored. Where not even
     the first list comes, and it is not refused, the others are not asked for. With `parameters`
-    those are read that missions, failsafes and streams depend on, and its home; without, that is
-    asked for where it is no row of the mission.
+    those are read that missions, failsafes and streams depend on. Its `home` is asked for with
+    them, and without where it is no row of the mission.
     """
     lists, missing = dict[MissionType, tuple[WireItem, ...]](), dict[MissionType, PartReport]()
     for part in parts:
@@ -170,7 +174,7 @@ def read_held(
             names += [(name,) for name in vehicle.family.setpoints.defaults]
         held = replace(held, reading=(yield from read_parameters(peer, names)))
     row = home_items(vehicle, MissionType.MISSION)
-    if parameters or not lists[MissionType.MISSION][:row]:
+    if home and (parameters or not lists[MissionType.MISSION][:row]):
         told = yield from ask_for(peer.address, HOME_POSITION, HomePosition)
         with suppress(InputError):  # off the Earth
             held = replace(held, home=None if told is None else home_in(told))

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
+from faao_mav.autopilot.manners import meanings_of
+
 
 class MissionType(IntEnum):
     """MAV_MISSION_TYPE: which of a vehicle's three lists is meant; `part` in names."""
@@ -42,18 +44,6 @@ class MavResult(IntEnum):
     OPERATION_CANCELLED = 15
 
 
-_MEANINGS = {
-    MavResult.UNSUPPORTED_FRAME: "the frame of an item is not supported",
-    MavResult.UNSUPPORTED: "a command, or this kind of list, is not supported",
-    MavResult.INVALID: "an item, or this kind of list, is invalid",
-    MavResult.INVALID_PARAM5_X: "the latitude (param5) of an item is out of range",
-    MavResult.INVALID_PARAM6_Y: "the longitude (param6) of an item is out of range",
-    MavResult.INVALID_PARAM7: "the altitude (param7) of an item is invalid",
-    MavResult.INVALID_SEQUENCE: "an item came out of turn",
-    MavResult.OPERATION_CANCELLED: "the vehicle gave the transfer up",
-}
-
-
 def meaning(result: int, own: Mapping[str, str]) -> str:
     """Return a MAV_MISSION_RESULT by its name, and what it says; `own` are an autopilot's meanings.
 
@@ -64,28 +54,17 @@ def meaning(result: int, own: Mapping[str, str]) -> str:
         known = MavResult(result)
     except ValueError:
         return f"result {result}"
-    text = own.get(known.name) or _MEANINGS.get(known)
+    text = own.get(known.name) or meanings_of("any").get(known.name)
     return f"{known.name} ({text})" if text else known.name
 
 
-_COMMAND_RESULTS = {
-    0: "ACCEPTED",
-    1: "TEMPORARILY_REJECTED (not now: one of its checks does not pass)",
-    2: "DENIED (not as it was asked, or in the state that it is in)",
-    3: "UNSUPPORTED (it does not know the command)",
-    4: "FAILED (it tried, or checked, and it did not work)",
-    6: "CANCELLED (by somebody else)",
-    10: "NOT_IN_CONTROL (another station is in control of it)",
-}
-
-
 def command_result(result: int) -> str:
-    """Return a MAV_RESULT by its name, and what it says.
+    """Return a MAV_RESULT, the answer to an order, by its name, and what it says.
 
-    >>> command_result(3), command_result(99)
-    ('UNSUPPORTED (it does not know the command)', 'MAV_RESULT 99')
+    >>> command_result(3), command_result(5), command_result(99)
+    ('UNSUPPORTED (it does not know the command)', 'IN_PROGRESS', 'MAV_RESULT 99')
     """
-    return _COMMAND_RESULTS.get(result, f"MAV_RESULT {result}")
+    return meanings_of("order").get(str(result), f"MAV_RESULT {result}")
 
 
 _SHOWN = 5  # Things that a message lists, at most; chosen.

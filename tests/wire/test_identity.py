@@ -21,8 +21,16 @@ from faao_mav.wire.client import holdings
 from faao_mav.wire.codec import Codec, message_id, sender_of
 from faao_mav.wire.discover import Heard, choose, discover
 from faao_mav.wire.machine import Script
-from faao_mav.wire.messages import Envelope, Heartbeat, Message, Statustext
-from faao_mav.wire.protocol import AIRFRAMES, GROUND_STATION, Address, MissionType
+from faao_mav.wire.messages import CommandLong, Envelope, Heartbeat, Message, Statustext
+from faao_mav.wire.protocol import (
+    AIRFRAMES,
+    GROUND_STATION,
+    HOME_POSITION,
+    POSITION,
+    Address,
+    MavCommand,
+    MissionType,
+)
 
 COPTER, ARDUPILOT, ARMED = 2, 3, 128
 BEAT = Heartbeat(COPTER, ARDUPILOT, 0, 0, 3)
@@ -117,8 +125,11 @@ def in_the_air(
 ) -> Air:
     """Have links lead to `vehicles`, by where they are: each says a heartbeat and its answer.
 
-    With an `echo` what is sent comes back, as from a router.
+    With an `echo` what is sent comes back, as from a router. Time passes while nothing is said.
     """
+    clock = [time.monotonic()]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("time.sleep", lambda seconds: clock.append(clock.pop() + seconds))
     station, codecs = Codec(GROUND_STATION), defaultdict[str, Codec](lambda: Codec(VEHICLE))
 
     def says(data: bytes | None) -> list[tuple[bytes, str]]:
@@ -127,7 +138,7 @@ def in_the_air(
         for origin, mock in vehicles.items():
             answers = [*mock.tick(now := time.monotonic())]
             for envelope in heard:
-                answers += BEAT, *mock.on(envelope, now)
+                answers += mock._heartbeat(), *mock.on(envelope, now)
             told += [(codecs[origin].pack(each), origin) for each in answers]
         return told
 
@@ -219,9 +230,9 @@ def test_an_address_is_never_followed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_only_who_flies_is_a_ground_station(monkeypatch: pytest.MonkeyPatch) -> None:
     """A failsafe for the loss of the ground station is neither hidden nor set off by looking on."""
-    mission, mock = a_mission(5), a_mock(speedup=100.0)
-    mock.start(time.monotonic())
+    mission, mock = a_mission(5), a_mock(speedup=10.0)
     air = in_the_air(monkeypatch, {HERE: mock}, echo=True)
+    mock.start(time.monotonic())
 
     def stop(_: object) -> None:
         raise KeyboardInterrupt
@@ -242,6 +253,24 @@ def test_only_who_flies_is_a_ground_station(monkeypatch: pytest.MonkeyPatch) -> 
     heard = [each.envelope for data in beats() for each in Codec(VEHICLE).parse(data)]
     assert {each.message.type for each in heard if each is not None} == {6}  # type: ignore[attr-defined]
     assert GROUND_STATION.system not in range(250, 256)
+
+
+def test_a_vehicle_in_flight_is_not_asked_for_its_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is not judged, nor kept waiting."""
+    mock: Any = MockAutopilot(behaviour_of("px4"), home=HOME, beat=0.1)
+    mock.lists.replace(MissionType.MISSION, rows_for("px4", 5))
+    mock.flight.armed, mock.flight.aircraft.landed = True, lambda _: False
+    air = in_the_air(monkeypatch, {HERE: mock})
+
+    def stop(_: object) -> None:
+        raise KeyboardInterrupt
+
+    assert fly_mission(Flight(a_mission(5)), TO, watching=stop).ending is not None
+    sent = [each.envelope for data, _ in air.sent for each in Codec(VEHICLE).parse(data)]
+    orders = [each.message for each in sent if each and isinstance(each.message, CommandLong)]
+    asked = {(each.command, each.param1) for each in orders}
+    assert (MavCommand.SET_INTERVAL, POSITION) in asked
+    assert (MavCommand.REQUEST_MESSAGE, HOME_POSITION) not in asked
 
 
 def test_a_vehicle_that_takes_orders_of_one_number_only(monkeypatch: pytest.MonkeyPatch) -> None:
