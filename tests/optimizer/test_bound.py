@@ -139,14 +139,17 @@ def test_no_flight_is_above_the_bounds(
         assert one.reached <= min(one.bounds) <= 1.6 * one.reached
 
 
-def test_a_zone_over_a_station_lowers_the_bound_and_instants_may_be_few(
-    bounded: Callable[[str], Bounded], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_zone_over_a_station_lowers_the_bound(bounded: Callable[[str], Bounded]) -> None:
     free = bounded("delivered")
     zone = {"fence.exclusion": [{"center": [0, 0], "radius": 30}]}
     fenced = build_problem(free.plan.changed(zone))
     found, most = (map_bound(each, free.best, cells=1000) for each in (fenced, free.problem))
     assert found < most - 1e-2
+
+
+def test_instants_of_a_flight_may_be_few(
+    bounded: Callable[[str], Bounded], monkeypatch: pytest.MonkeyPatch
+) -> None:
     one = bounded("free ends")
     for instants in (1, 2, 3):
         monkeypatch.setattr("faao_mav.optimizer.search.axis_bound._MOST_INSTANTS", instants)
@@ -253,9 +256,7 @@ def test_a_known_plan_tightens_it_and_stays_below(
     assert tightened.value <= 2 * problem.bs_uav.transmit
 
 
-def test_samples_and_best_rates_are_close_to_their_bounds(
-    small_plan: MakePlan,
-) -> None:
+def test_samples_are_close_to_their_bounds() -> None:
     """The copter's by the map within three hundredths, the paper's by the axis in a thirtieth."""
     copter = read_plan(MISSIONS / "copter_relay.yaml")
     problem, reached = build_problem(copter), optimize(copter).delivered_rate
@@ -265,6 +266,9 @@ def test_samples_and_best_rates_are_close_to_their_bounds(
     problem, reached = build_problem(paper), optimize(paper).rates.R_avg
     cells = AxisBound(problem, best_rates(problem), 8, 4)
     assert reached < cells.bound([0.4, 0.45, 0.5, 0.55, 0.6]) < 1.03 * reached
+
+
+def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> None:
     alone = {"radio.base_station.antennas": 1, "radio.relay.antennas": 1}
     for changes in ({}, {"radio.line_of_sight": "all_ones"}, alone):
         problem = build_problem(small_plan(FAINT | changes))

@@ -89,7 +89,7 @@ def test_the_whole_path_keeps_the_margin(name: str) -> None:
     assert plan.margin - 1e-6 <= (solution.clearance() or 0) <= clearance(solution) + 1e-6
 
 
-def test_a_fenced_solution_is_stationary_and_kept(tmp_path: Path, small_plan: MakePlan) -> None:
+def test_a_fenced_solution_is_stationary_and_kept(tmp_path: Path) -> None:
     changes = {"flight.time_step": 3.0, "optimizer.max_iterations": 50}
     solution = optimize(fenced("a fence from a file", **{**QUICK, **changes}))
     assert solution.converged
@@ -99,6 +99,9 @@ def test_a_fenced_solution_is_stationary_and_kept(tmp_path: Path, small_plan: Ma
     again = load_solution(tmp_path / "elsewhere.npz")
     assert again.is_feasible()
     assert again.residuals()["fence"] == 0
+
+
+def test_a_plan_in_half_duplex_with_free_ends_keeps_out(small_plan: MakePlan) -> None:
     tight = {
         "radio.causal": True,
         "radio.duplex": "half",
@@ -112,7 +115,7 @@ def test_a_fenced_solution_is_stationary_and_kept(tmp_path: Path, small_plan: Ma
     assert solution.is_feasible()
 
 
-def test_both_ways_round_are_starts_and_no_time_for_them_is_said() -> None:
+def test_both_ways_round_are_starts() -> None:
     problem = build_problem(fenced("a circle on the straight line", **QUICK))
     assert problem.free_area is not None
     kin = problem.kinematics
@@ -124,6 +127,9 @@ def test_both_ways_round_are_starts_and_no_time_for_them_is_said() -> None:
     assert sides == {-1.0, 1.0}
     for flight in flights.values():
         assert max(kin.residuals(flight).values()) < 1e-6
+
+
+def test_no_time_for_the_way_round_is_said() -> None:
     hasty = QUICK | {"flight.time_step": 1.5, "flight.duration": 70.5}
     with pytest.raises(InfeasibleError, match="inside the fence"):
         optimize(fenced("two ways round of different worth", **hasty))

@@ -65,7 +65,7 @@ def test_the_least_duration_is_that_of_trying_all() -> None:
             assert found.least.below.delivered_rate < found.least.below.plan.needed_rate
 
 
-def test_the_least_power_is_just_enough_and_out_of_reach_says_what_is_possible() -> None:
+def test_the_least_power_is_just_enough() -> None:
     share, full = 0.6, delivered({})
     found = optimize(BASE.changed({"goal": {"rate": share * full, "minimise": "power"}}))
     base, relay = found.plan.radio.base_station.power, found.plan.radio.relay.power
@@ -85,6 +85,9 @@ def test_the_least_power_is_just_enough_and_out_of_reach_says_what_is_possible()
     told = Result(found).as_dict()["goal"]
     assert told["power_dbm"] == pytest.approx([dbm(base), dbm(relay)])
     assert told["one_step_less"]["delivered_rate"] == below.delivered_rate
+
+
+def test_a_goal_out_of_reach_says_what_is_possible() -> None:
     most = delivered({})
     for goal, *told in (
         (
@@ -253,7 +256,7 @@ def hovering(changes: dict[str, Any] | None = None) -> Plan:
     return parse_plan(HOVER).changed(changes or {})
 
 
-def test_the_best_height_is_that_of_the_closed_form_and_the_better_of_two_optima() -> None:
+def test_the_best_height_is_that_of_the_closed_form() -> None:
     """20 log10(cos e) + c sin(e) is highest where c (1 - s^2) = 20 s / ln 10, s = sin(e)."""
     c = 16.0
     k = 20 / (math.log(10) * c)
@@ -261,6 +264,8 @@ def test_the_best_height_is_that_of_the_closed_form_and_the_better_of_two_optima
     found = optimize(hovering({"radio.gain.elevation_db": [c]}))
     assert found.plan.flight.altitude == pytest.approx(100 * s / math.sqrt(1 - s * s), abs=0.5)
 
+
+def test_the_better_of_two_local_optima_is_found() -> None:
     def peaks(candidate: Plan, known: Trajectory | None) -> Solution:
         asked.append(known is not None)
         height = candidate.flight.altitude
@@ -271,6 +276,9 @@ def test_the_best_height_is_that_of_the_closed_form_and_the_better_of_two_optima
     found = best_height(hovering(), peaks)
     assert found.plan.flight.altitude == pytest.approx(93.4, abs=0.5)
     assert asked == [False, *[True] * (len(asked) - 1)]  # each begins with a flight nearby
+
+
+def test_other_heights_are_refused() -> None:
     for height in ({"least": 20}, {"least": 60, "most": 40}, {"least": 0, "most": 40}, "high"):
         with pytest.raises(PlanError, match=r"flight\.altitude[.:].*\{least: metres, most: metre"):
             hovering({"flight.altitude": height})
@@ -284,7 +292,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("few")
-def test_the_ceiling_of_the_vehicles_fence_and_a_goal_count() -> None:
+def test_the_ceiling_of_the_vehicles_fence_counts() -> None:
     """Where the highest is the best; without terms over the elevation it is the lowest."""
     for autopilot, parameters, expected in (
         ("ardupilot", {"FENCE_ENABLE": 1, "FENCE_TYPE": 9, "FENCE_ALT_MAX": 60}, 60.0),
@@ -302,7 +310,11 @@ def test_the_ceiling_of_the_vehicles_fence_and_a_goal_count() -> None:
 
     with pytest.raises(PlanError, match=r"flight\.altitude: 20 to 120 m.*-inf to 15 m"):
         optimize(hovering({"vehicle.autopilot": "px4", "vehicle.parameters.GF_MAX_VER_DIST": 15}))
-    # where gains are 3 dB higher, so much less power does
+
+
+@pytest.mark.usefixtures("few")
+def test_a_goal_is_met_at_the_height_where_it_takes_least() -> None:
+    """Where gains are 3 dB higher, so much less power does."""
     asked = {"goal": {"minimise": "power", "rate": 0.5}, "radio.gain.elevation_db": [12]}
     found = optimize(hovering({**asked, **dict.fromkeys(ALIASES[POWER], 20)}))
     assert found.height is not None

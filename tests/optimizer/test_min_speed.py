@@ -135,9 +135,7 @@ def turned(solution: Solution) -> Real:
     return np.asarray(np.linalg.norm(solution.a[:-1], axis=1) / most)
 
 
-def test_turns_are_as_fast_as_the_guidance_follows(
-    small_plan: MakePlan,
-) -> None:
+def test_turns_are_as_fast_as_the_guidance_follows(small_plan: MakePlan) -> None:
     plan = small_plan(TURNING | {"vehicle.min_speed": 9})
     solution = optimize(plan)
     assert solution.is_feasible()
@@ -153,6 +151,9 @@ def test_turns_are_as_fast_as_the_guidance_follows(
     residuals = optimize(lively).residuals()
     assert residuals["fall of airspeed"] < 1e-6
     assert residuals["minimum speed"] < 1e-6
+
+
+def test_turns_allowed_in_the_air_are_allowed_over_ground() -> None:
     rng = np.random.default_rng(0)
     for _ in range(30):
         wind, least = tuple(rng.uniform(-30, 30, 2).tolist()), float(rng.uniform(1, 25))

@@ -56,7 +56,7 @@ def differs(link: Link, rate: RateModel, w: Real, *, curvature: float = 1e-2) ->
     assert hessian == pytest.approx(hessian_by_differences(value, w), rel=curvature, abs=1e-4)
 
 
-def test_the_envelope_theorem_and_tables_of_mutual_information(small_plan: MakePlan) -> None:
+def test_the_envelope_theorem(small_plan: MakePlan) -> None:
     """At the best precoders: the exact slope, and a curvature that is never too high."""
     plan = small_plan({"radio.fading": "realization"})
     link = build_problem(plan).bs_uav
@@ -66,7 +66,10 @@ def test_the_envelope_theorem_and_tables_of_mutual_information(small_plan: MakeP
     assert gradient == pytest.approx(gradient_by_differences(best, w), rel=1e-4, abs=1e-7)
     excess = hessian - hessian_by_differences(best, w)
     assert np.linalg.eigvalsh(excess).max() < 1e-5
-    # the curves are smooth, and nowhere above what precoders of the place itself carry
+
+
+def test_tables_of_mutual_information(small_plan: MakePlan) -> None:
+    """The curves are smooth, and nowhere above what precoders of the place itself carry."""
     for_it = {"optimizer.rate": "mutual_information", "radio.line_of_sight": "all_ones"}
     plan = small_plan(for_it | {"radio.fading_samples": 2})
     wanted, link = design(plan), build_problem(plan).bs_uav
@@ -76,7 +79,7 @@ def test_the_envelope_theorem_and_tables_of_mutual_information(small_plan: MakeP
     H = link.channel(w)
     P = table.initial_precoders(*at)
     assert table.value(*at) == pytest.approx(wanted.rate(link, H, P), abs=3e-3)
-    differs(link, rate, w)
+    differs(link, table, w)
 
 
 STEPS = {"snr_db": [2, 6, 11, 15], "bit_per_s_per_hz": [0.5, 1, 2, 3.5]}
@@ -143,9 +146,7 @@ SPREAD: dict[str, Any] = {
 }
 
 
-def test_shadows_are_fields_and_a_toll_their_variance(
-    small_plan: MakePlan,
-) -> None:
+def test_shadows_are_fields_of_the_spread_and_the_correlation(small_plan: MakePlan) -> None:
     own = {"spread_db": 3, "correlation_m": 100}
     problem = build_problem(small_plan(SPREAD | {"radio.ground_user.gain": own}))
     w = np.array([[0.0, 0.0], [15.0, 20.0], [60.0, 80.0], [900.0, 0.0]])
@@ -156,7 +157,10 @@ def test_shadows_are_fields_and_a_toll_their_variance(
     assert np.corrcoef(X[:, 0, 0], X[:, 1, 0])[0, 1] == pytest.approx(0, abs=0.06)
     again = next(shadows(problem, w))
     np.testing.assert_array_equal(again, X[0])
-    # at one place with rates 2 + X / 10 the mean of the smaller is 2 - 0.6 / sqrt(pi)
+
+
+def test_the_smaller_of_two_normal_rates(small_plan: MakePlan) -> None:
+    """At one place with rates 2 + X / 10 the mean of the smaller is 2 - 0.6 / sqrt(pi)."""
     problem = build_problem(small_plan(SPREAD))
     w = np.zeros((problem.kinematics.slots, 2))
     found = outcomes(problem, w, lambda db: np.full((2, len(w)), 2 + db / 10), 3000)
@@ -165,7 +169,10 @@ def test_shadows_are_fields_and_a_toll_their_variance(
     found = found[:, -1] / len(w)
     assert found.mean() == pytest.approx(2 - 0.6 / np.sqrt(np.pi), abs=0.04)
     assert np.quantile(found, 0.5) == pytest.approx(2 - 0.6 * 0.5449, abs=0.05)
-    # to first order, of a few slots that move, and with slopes as differences have them
+
+
+def test_a_toll_is_as_steep_as_the_variance(small_plan: MakePlan) -> None:
+    """To first order, of a few slots that move, and with slopes as differences have them."""
     plan = small_plan(SPREAD)
     problem = build_problem(plan)
     field = rate_field(problem, design(plan))

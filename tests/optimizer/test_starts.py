@@ -142,7 +142,7 @@ COPTER = make(
 FREE = replace(COPTER, start_velocity=None, end_velocity=None)
 
 
-def test_straight_starts_in_calm_air_and_wind() -> None:
+def test_starts_in_wind_keep_the_limits_or_there_is_none() -> None:
     there = {"bs": np.zeros(2), "user": np.array([80.0, 90.0])}
     for calm, (speed, degrees) in product(
         (COPTER, FREE), ((3.0, 135.0), (7.0, 20.0), (8.9, 250.0))
@@ -156,10 +156,16 @@ def test_straight_starts_in_calm_air_and_wind() -> None:
         else:
             for flight in flights.values():
                 assert worst(kin, flight) < 1e-7
+
+
+def test_the_frame_of_the_air_is_calm() -> None:
     windy = replace(FREE, wind=(4.0, -3.0), min_speed=3.0, max_speed=20.0)
     flight = straight_flight(windy.in_the_air())
     assert worst(windy.in_the_air(), flight) < 1e-9
     assert worst(windy, windy.over_ground(flight)) < 1e-9
+
+
+def test_the_straight_start_is_feasible_at_all_ends() -> None:
     for ends, bounded, end in product(ENDS, (True, False), ([50.0, 0.0], [0.0, 50.0])):
         first, last = (None if v is None else np.array(v, dtype=float) for v in ends)
         kin = make(
@@ -173,12 +179,18 @@ def test_straight_starts_in_calm_air_and_wind() -> None:
         assert worst(kin, flight) < 1e-7
     with pytest.raises(InfeasibleError, match="end velocities"):
         straight_flight(make(start_velocity=np.array([20.0, 0.0]), slots=5))
+
+
+def test_hover_to_hover_is_straight_and_even() -> None:
     flight = straight_flight(make())
     assert flight.w @ np.array([1.0, 1.0]) == pytest.approx(50)
     speed = np.linalg.norm(flight.v, axis=1)
     assert speed == pytest.approx(speed[::-1], abs=1e-9)
     # 10 s of which two ramps at 5 m/s²: 70.7 m = v (10 - v / 5), up to the discretisation
     assert speed.max() == pytest.approx(8.5, abs=0.1)
+
+
+def test_residuals_see_every_violation() -> None:
     kin = make()
     flight = straight_flight(kin)
     w, v, a = flight.w.copy(), flight.v.copy(), flight.a.copy()

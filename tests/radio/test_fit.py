@@ -85,12 +85,15 @@ def test_without_noise_the_law_itself_is_found(
     assert off(fit, gain) < 0.05
 
 
-def test_outliers_move_nothing_and_what_is_not_finite_or_not_flown_is_left_out() -> None:
+def test_outliers_move_nothing() -> None:
     gain = (-45.0, 2.0, 20.0)
     clean = levels([flight(50.0), flight(100.0, 1)], gain, 3.0, 30.0, 1)
     rare = [60.0 * (np.arange(len(each.t)) % 40 == 0) for each in clean]
     struck = [replace(each, level=each.level + x) for each, x in zip(clean, rare, strict=True)]
     assert off(fit_link(struck), gain) < off(fit_link(clean), gain) + 1.0
+
+
+def test_what_is_not_finite_or_not_flown_is_left_out() -> None:
     (sound,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
     gaps = sound.level.copy()
     gaps[5:20], gaps[40] = np.nan, np.inf
@@ -101,19 +104,25 @@ def test_outliers_move_nothing_and_what_is_not_finite_or_not_flown_is_left_out()
     assert off(fit, (-45.0, 2.0)) < 3.0
 
 
-def test_one_leg_and_no_spread_of_elevations_give_no_terms_that_run_wild() -> None:
+def test_one_leg_gives_the_level_alone() -> None:
     one = flight(50.0, rows=1)
     fit = fit_link(levels([one], (-45.0, 2.0, 30.0, -20.0), 3.0, 30.0, 0))
     assert fit.legs == 1
     assert (fit.exponent, fit.elevation) == (2.0, ())
     assert fit.error == np.inf
+
+
+def test_no_flight_is_refused() -> None:
     (some,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
     with pytest.raises(InputError, match="one place alone"):
         fit_link([replace(some, place=0 * some.place + 40.0)])
     some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
     with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
         fit_link([some])
-    # high above and far away the sine hardly changes: its terms would be anything elsewhere
+
+
+def test_no_spread_of_elevations_gives_no_terms_that_run_wild() -> None:
+    """High above and far away the sine hardly changes: its terms would be anything elsewhere."""
     far = flight(30.0)
     far = replace(far, place=far.place + np.array([3000.0, 0.0, 0.0]))
     for seed in range(2):
@@ -151,7 +160,7 @@ def apart(shadow: Spline, value: Real, x: Real, y: Real) -> float:
     return float(np.sqrt(np.mean((shadow.value(x, y) - value) ** 2)))
 
 
-def test_the_map_tells_a_field_between_the_legs_and_is_none_of_noise() -> None:
+def test_the_map_tells_a_field_between_the_legs() -> None:
     shadow = field(1, 4.0)
     fit = fit_link([legs(shadow, 1.0)], 1.0)
     found, alone, error = kriged(fit, STATION)
@@ -165,6 +174,9 @@ def test_the_map_tells_a_field_between_the_legs_and_is_none_of_noise() -> None:
     assert far == pytest.approx(0, abs=1e-9)
     assert (found.origin, found.above_law) == ((47.0, 8.0), True)
     assert found.heights[0] <= 60 <= found.heights[-1]
+
+
+def test_of_noise_there_is_no_map() -> None:
     found, alone, error = kriged(fit_link([legs(field(4, 1e-9), 3.0)], 1.0), STATION)
     assert error > 0.97 * alone
     if found is not None:
@@ -185,7 +197,7 @@ def table(folder: Path, header: str, level: object, separator: str = ",") -> Pat
     return path
 
 
-def test_headers_tell_what_is_measured_and_units_are_asked_for(tmp_path: Path) -> None:
+def test_headers_tell_what_is_measured(tmp_path: Path) -> None:
     for header, level, unit, value in (
         ("time_s,latitude,longitude,altitude_m,rsrp_dbm", -80.5, "dbm", -80.5),
         ("Time [s],Lat (deg),Lon (deg),Alt (m),RSRP [dBm]", -80.5, "dbm", -80.5),
@@ -199,11 +211,17 @@ def test_headers_tell_what_is_measured_and_units_are_asked_for(tmp_path: Path) -
         np.testing.assert_allclose(found.samples.level, value)
         np.testing.assert_allclose(found.samples.place[0], [0.0, 110.94, 50.0], atol=0.1)
         assert found.left_out == 0
+
+
+def test_units_that_a_header_does_not_tell_are_asked_for(tmp_path: Path) -> None:
     path = table(tmp_path, "time,lat,lon,alt,rssi", -70)
     with pytest.raises(InputError, match=r"'alt' has no unit.*--unit altitude=UNIT, one of m"):
         read_measured(path, ANTENNA)
     found = read_measured(path, ANTENNA, {"altitude": "ft", "rssi": "dBm"})
     np.testing.assert_allclose(found.samples.place[:, 2], 60 * 0.3048 - 10)
+
+
+def test_counts_of_a_device_are_calibrated(tmp_path: Path) -> None:
     path = table(tmp_path, "time_s,lat,lon,alt_m,rssi", 100)
     raw, sik = {"rssi": "raw"}, {"rssi": "sik"}
     for units, calibration, level in (
@@ -216,6 +234,9 @@ def test_headers_tell_what_is_measured_and_units_are_asked_for(tmp_path: Path) -
         assert found.unit == "dbm"
     with pytest.raises(InputError, match=r"expected two of them in dBm by --calibrate"):
         read_measured(path, ANTENNA, raw, [(0, -120)])
+
+
+def test_decimal_commas_times_of_day_and_rows_without_a_number(tmp_path: Path) -> None:
     header = "time;lat;lon;alt_m;snr_db"
     rows = [f"2024-05-01T10:00:{k:02d}Z;-34,999;149,0;60,0;1{k % 10},5" for k in range(20)]
     rows[3], rows[7], rows[9] = "not a row", "2024-05-01T10:00:07Z;-34,999;149,0;60,0;NaN", ""

@@ -88,7 +88,7 @@ def test_a_map_with_an_origin_of_its_own_is_moved_as_a_whole() -> None:
         found.about(47.13, 8.0, 450.0)
 
 
-def test_arrays_and_tables_that_are_no_map_are_refused(tmp_path: Path) -> None:
+def test_arrays_that_are_no_map_are_refused(tmp_path: Path) -> None:
     arrays_told: tuple[tuple[dict[str, Any], str], ...] = (
         ({"east": None}, "gain_db, north in it; expected a map with east, north and gain_db or"),
         ({"above_law_db": np.zeros((4, 5))}, "above_law_db, east, gain_db, north in it; expected"),
@@ -114,6 +114,9 @@ def test_arrays_and_tables_that_are_no_map_are_refused(tmp_path: Path) -> None:
         np.savez(tmp_path / "a.npz", **kept)
         with pytest.raises(InputError, match=f"a.npz: {told}"):
             read_map(tmp_path / "a.npz")
+
+
+def test_tables_that_are_no_map_are_refused(tmp_path: Path) -> None:
     for text, told in (
         ("", "line 1: columns ''; give a header with east_m, north_m and gain_db, or"),
         ("east_m,north_m\n0,0\n", "line 1: columns 'east_m, north_m'"),
@@ -130,7 +133,7 @@ def test_arrays_and_tables_that_are_no_map_are_refused(tmp_path: Path) -> None:
             read_map(tmp_path / "a.csv")
 
 
-def test_files_that_are_no_archive_and_words_that_are_no_map_are_refused(tmp_path: Path) -> None:
+def test_files_that_are_no_archive_are_refused(tmp_path: Path) -> None:
     for name, told in (("a.npz", "not a map"), ("a.tif", "cannot be read"), ("a.json", "ends in")):
         if name.endswith("tif"):
             pytest.importorskip("rasterio")
@@ -139,6 +142,9 @@ def test_files_that_are_no_archive_and_words_that_are_no_map_are_refused(tmp_pat
             read_map(tmp_path / name)
     with pytest.raises(InputError, match=r"none\.npz: cannot be read"):
         read_map(tmp_path / "none.npz")
+
+
+def test_words_that_are_no_map_are_refused() -> None:
     sound = map_word(GainMap(EAST, NORTH, np.array([60.0]), np.zeros((1, 4, 5))))
     for word in (WORD, WORD + "AAAA", WORD + "ä", sound[:-40]):
         with pytest.raises(InputError, match=r"not the numbers of a map|missing"):

@@ -63,7 +63,7 @@ def test_between_cutoff_rate_and_ceilings(
     assert mean <= min(classes.bits + 1e-9, gaussian + slack)
 
 
-def test_extremes_the_slope_and_the_spread_over_seeds() -> None:
+def test_extremes() -> None:
     H, eye = np.array([[[1.0, 0.3j], [0.2, 1.0]]]), np.eye(2)[None]
     for modulation in ("bpsk", "8psk", "16qam"):
         bits = difference_classes(modulation, 2).bits
@@ -74,7 +74,10 @@ def test_extremes_the_slope_and_the_spread_over_seeds() -> None:
         assert weak == pytest.approx(np.linalg.norm(H) ** 2 / 1e5 / np.log(2.0), rel=0.05)
     with pytest.raises(InputError, match="noise"):
         mutual_information(ONE, ONE, "bpsk", 0.0)
-    # I-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)
+
+
+def test_the_errors_give_the_slope() -> None:
+    """I-MMSE: dI = 2 Re tr((H^H H P E)^H dP) / (sigma² ln 2)."""
     H, P, change = channel(6, 1, 1, 2, 2), channel(7, 1, 1, 2, 2), 1e-4 * channel(8, 1, 1, 2, 2)
     errors = np.zeros((1, 1, 2, 2), dtype=np.complex128)
     mutual_information(H, P, "qpsk", 0.75, errors=errors)
@@ -82,8 +85,11 @@ def test_extremes_the_slope_and_the_spread_over_seeds() -> None:
     up, down = (mutual_information(H, P + step, "qpsk", 0.75).mean() for step in (change, -change))
     slope = np.sum((gradient.conj() * change[:, 0]).real)
     assert slope == pytest.approx((up - down) / 2, rel=0.03)
-    # beside many times as many noises; more noises err less
-    H = np.sqrt(2.0) * channel(4, 32, 2, 2)
+
+
+def test_the_spread_over_seeds_is_the_error() -> None:
+    """Beside many times as many noises; more noises err less."""
+    H, eye = np.sqrt(2.0) * channel(4, 32, 2, 2), np.eye(2)[None]
     exact = mutual_information(H, eye, "qpsk", 1.0, nodes=1 << 17).mean()
 
     def means(nodes: int) -> list[float]:

@@ -56,6 +56,9 @@ def test_mmse_lies_between_maximum_ratio_and_zero_forcing() -> None:
     # With more receiving antennas, the link is orthogonal: no stream disturbs another.
     link = (H := channel(3, 4, 2)) @ zf(H, 3.0, 1.0)
     parallel(link.conj().T @ link, np.eye(2))
+
+
+def test_what_is_refused() -> None:
     for scheme in SCHEMES.values():
         with pytest.raises(InputError, match="power"):
             scheme(np.eye(2), 0.0, 1.0)
@@ -82,7 +85,7 @@ def test_waterfilling_meets_the_optimality_conditions(
     assert np.all(floor[~used] >= level[0] * (1 - 1e-9))
 
 
-def test_channels_agree_with_positions_powers_and_limits() -> None:
+def test_arrays_agree_with_the_positions_of_their_elements() -> None:
     wavelength = 1e-4
     east = np.array([0.5 * wavelength, 0.0, 0.0])
     transmitters = np.arange(2)[:, None] * east
@@ -93,6 +96,9 @@ def test_channels_agree_with_positions_powers_and_limits() -> None:
         H = line_of_sight_ula(path, 3, 2)
         np.testing.assert_allclose(H, expected, atol=1e-4)
         assert np.abs(H - expected.conj()).max() > 0.5  # the other sign would not pass
+
+
+def test_rayleigh_has_unit_power_and_repeats() -> None:
     H = rayleigh(np.random.default_rng(3), 5000, 2, 3)
     assert H.shape == (5000, 2, 3)
     assert np.mean(np.abs(H) ** 2) == pytest.approx(1.0, abs=0.02)
@@ -104,6 +110,9 @@ def test_channels_agree_with_positions_powers_and_limits() -> None:
     fewer = balanced_rayleigh(np.random.default_rng(3), 3, 2, 3)  # too few for the rotations
     scaled = fewer / rayleigh(np.random.default_rng(3), 3, 2, 3)
     assert np.abs(scaled - scaled[0, 0, 0]).max() < 1e-12
+
+
+def test_rician_limits() -> None:
     nlos = rayleigh(np.random.default_rng(5), 4, 2, 2)
     los = np.ones((2, 2))
     np.testing.assert_array_equal(rician(los, nlos, np.inf), np.broadcast_to(los, nlos.shape))

@@ -76,12 +76,15 @@ def test_best_shares_are_those_of_the_program(route: tuple[Real, Real], buffer: 
     assert relayed.rate == pytest.approx(most(*route, buffer, half=True), abs=1e-7)
 
 
-def test_a_long_hover_is_shared_and_what_no_relay_has_refused() -> None:
+def test_a_long_hover_has_rates_that_are_equal_but_for_rounding() -> None:
     n, u, g = 1000, 1.39, 0.63
     noise = 1 + 1e-15 * np.random.default_rng(1).standard_normal((2, n))
     I_U, I_G = u * noise[0], g * noise[1]
     rate = RelayQueue(half=True).relayed(I_U, I_G, 1.0).rate
     assert rate == pytest.approx(u * g / (u + g), abs=1 / n)
+
+
+def test_what_no_relay_has_is_refused() -> None:
     two = np.ones(2)
     for I_U, I_G, buffer in (
         (np.ones(3), two, 1.0),

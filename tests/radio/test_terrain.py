@@ -34,7 +34,7 @@ def loss(d: float, tops: Real, ends: tuple[float, float], wavelength: float) -> 
     return float(diffraction_loss(np.array([d]), SHARE, tops, (ends[0], last), wavelength)[0])
 
 
-def test_edges_and_the_smooth_earth_lose_what_closed_forms_say() -> None:
+def test_one_edge_is_itself_and_two_are_bullingtons() -> None:
     d, wavelength, h = 1000.0, 0.125, 12.0
     edge: Real = np.where(np.abs(SHARE - 0.5) < 1e-9, h, -50.0)
     bulge = d**2 / 8 / EARTH
@@ -51,14 +51,20 @@ def test_edges_and_the_smooth_earth_lose_what_closed_forms_say() -> None:
     low = np.where(np.abs(SHARE - 0.5) < 1e-9, 0.0, -5.0)  # just below the line: a case of its own
     nu = d**2 / 8 / EARTH * np.sqrt(8 / (wavelength * d))
     assert loss(d, low, (0.0, 0.0), wavelength) == pytest.approx(whole(nu), abs=0.1)
-    # P.526-15 (30), the exact loss, beside (31), its approximation: J(0) is half the field
+
+
+def test_a_knife_edge_loses_what_fresnels_integrals_say() -> None:
+    """P.526-15 (30), the exact loss, beside (31), its approximation: J(0) is half the field."""
     assert knife_edge_loss(np.array(0.0)) == pytest.approx(6.02, abs=0.02)
     nu = np.linspace(-0.7, 8.0, 200)
     S, C = fresnel(nu)
     exact = -20 * np.log10(np.hypot(1 - C - S, C - S) / 2)
     assert np.abs(knife_edge_loss(nu) - exact).max() < 0.2
     assert knife_edge_loss(np.array(-5.0)) == 0
-    # both see the earth at sqrt(2 R h): the slope there is d / 2R - sqrt(2 h / R)
+
+
+def test_the_smooth_earth_hides_what_is_beyond_the_horizon() -> None:
+    """Both see the earth at sqrt(2 R h): the slope there is d / 2R - sqrt(2 h / R)."""
     d, wavelength, h = 60e3, 0.3, 20.0
     slope = d / (2 * EARTH) - np.sqrt(2 * h / EARTH)
     nu = slope * d / 2 * np.sqrt(8 / (wavelength * d))
@@ -78,7 +84,7 @@ def tile(folder: Path, heights: Any, side: int = 1201, name: str = "N47E008.hgt"
     return path
 
 
-def test_ridges_clutter_and_unknown_heights(tmp_path: Path) -> None:
+def test_a_ridge_hides_what_is_behind_it(tmp_path: Path) -> None:
     path = tile(tmp_path, lambda x, _: 500 + 100 * np.exp(-(((x - 400) / 150) ** 2)))
     raster, unknown = read_terrain(path)
     assert unknown == 0
@@ -99,7 +105,10 @@ def test_ridges_clutter_and_unknown_heights(tmp_path: Path) -> None:
     assert found.above_law
     assert found.ground is not None
     assert found.ground[16, at[400]] == pytest.approx(100, abs=6)
-    # its tops are the horizon of whoever stands below them
+
+
+def test_clutter_stands_on_the_ground_but_at_the_station(tmp_path: Path) -> None:
+    """Its tops are the horizon of whoever stands below them."""
     raster, _ = read_terrain(tile(tmp_path, lambda *_: 500.0))
     bare, wood = (
         terrain_map([raster], STATION, 2.4e9, (30.0,), clutter, 500.0, 100.0)
@@ -112,6 +121,9 @@ def test_ridges_clutter_and_unknown_heights(tmp_path: Path) -> None:
     assert wood.db[0, 5, -1] < -6
     low = terrain_map([raster], STATION, 2.4e9, (15.0,), 20.0, 500.0, 100.0)
     assert low.barred(15.0).all()
+
+
+def test_heights_that_are_not_known_are_the_nearest_and_others_refused(tmp_path: Path) -> None:
     path = tile(tmp_path, lambda x, _: np.where(x < -400, -32768, 300 + 0 * x))
     raster, unknown = read_terrain(path)
     assert unknown > 1000
@@ -133,7 +145,9 @@ def test_ridges_clutter_and_unknown_heights(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match=f"{name}: .*{told}"):
             read_terrain(tmp_path / name)
-    # tiles south and west have their corner there
+
+
+def test_tiles_south_and_west_have_their_corner_there(tmp_path: Path) -> None:
     side = np.arange(1201)
     path = tmp_path / "S36W071.hgt"
     path.write_bytes(np.add.outer(-side, side).astype(">i2").tobytes())

@@ -145,7 +145,7 @@ def test_a_mission_goes_around_what_lies_between_home_and_the_route(autopilot: s
     assert speeds[0] == speeds[-1] == 10.0 > max(speeds[1:-1])  # slower on the route alone
 
 
-def test_homes_run_ins_and_ways_that_cannot_be_are_named() -> None:
+def test_homes_and_ways_that_cannot_be_are_named() -> None:
     wall = {"polygon": [[-400, 15], [400, 15], [400, 30], [-400, 30]]}
     cell = [[-300, -100], [400, -100], [400, 300], [-300, 300]]
     near, inside = ([{"center": [x, 0], "radius": 8}] for x in (10, 5))
@@ -158,6 +158,9 @@ def test_homes_run_ins_and_ways_that_cannot_be_are_named() -> None:
     ):
         with pytest.raises(error, match=told):
             check_vehicle(walled(**{"fence.exclusion": zones, **inclusion}))
+
+
+def test_a_run_in_has_to_be_free_as_well() -> None:
     at_speed = {"flight.start_velocity": [8, 0], "fence.exclusion": [WALL]}
     behind = {"polygon": [[-30, 40], [-10, 40], [-10, 80], [-30, 80]]}
     free, blocked = (
@@ -175,6 +178,9 @@ def test_homes_run_ins_and_ways_that_cannot_be_are_named() -> None:
                 InfeasibleError, match=r"before flight\.start.*give flight\.start_v"
             ):
                 assemble(route, plan)
+
+
+def test_a_way_that_is_not_needed_is_not_there() -> None:
     aside = walled(**{"fence.exclusion": [{"center": [150, 200], "radius": 20}]})
     without = parse_plan(edited(aside.text, {"fence": None}))
     route = initial_route(T, W, aside)

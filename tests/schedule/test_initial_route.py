@@ -80,7 +80,7 @@ def test_any_flight_keeps_to_its_path(
         assert nominal(route) == pytest.approx(t[-1] - t[0], abs=1.0 + 5e-3 * len(route.speeds))
 
 
-def test_hovers_are_holds_and_a_swing_past_one_belongs_to_it() -> None:
+def test_hovers_are_holds() -> None:
     t, w = dash_hover_dash(hover=40.0)
     route = check(t, w, plan_with())
     assert route.waits.tolist() == [0, 41, 0]  # below 0.75 m/s for half a second on each side
@@ -97,7 +97,10 @@ def test_hovers_are_holds_and_a_swing_past_one_belongs_to_it() -> None:
         assert (route.positions.shape, route.waits.tolist()) == ((1, 2), [100])
     route = check(t, np.outer(t / 100, [0.5, 0.0]), plan_with())
     assert len(route.positions) == 2
-    # such a plan brakes as hard as it may, `far` past the hover, and comes back to it
+
+
+def test_a_swing_past_a_hover_belongs_to_it() -> None:
+    """Such a plan brakes as hard as it may, `far` past the hover, and comes back to it."""
     t = np.arange(0, 100, STEP)
     on = dash(0, 200, 8, 2.0, np.maximum(t - 65, 0))
     for far in (1.0, 2.6):
@@ -108,7 +111,7 @@ def test_hovers_are_holds_and_a_swing_past_one_belongs_to_it() -> None:
         assert np.hypot(*(route.positions[1] - [120, 160])) < 1
 
 
-def test_a_creep_is_short_ways_and_waits_and_so_is_dithering_about_a_place() -> None:
+def test_a_creep_is_short_ways_and_waits() -> None:
     for speed in (0.25, 0.05):
         t = np.arange(0, 60, STEP)
         w = np.outer(speed * t, [0.0, 1.0])
@@ -117,7 +120,10 @@ def test_a_creep_is_short_ways_and_waits_and_so_is_dithering_about_a_place() -> 
         assert (route.speeds >= 0.75).all()
         at = np.stack([np.interp(t, route.departures, x) for x in route.positions.T], axis=-1)
         assert lengths(at - w).max() <= 2.5
-    # 8 s on a circle of 0.8 m at 1.3 m/s between legs at 5 m/s, as spare time may be filled
+
+
+def test_a_plan_that_dithers_about_a_place_waits_there() -> None:
+    """8 s on a circle of 0.8 m at 1.3 m/s between legs at 5 m/s, as spare time may be filled."""
     t = STEP * np.arange(0.0, 40.0 / STEP)
     angle = 1.6 * np.clip(t - 16, 0, 8)
     along = np.clip(5 * (t - 16), None, 0) + np.clip(5 * (t - 24), 0, None)
@@ -156,7 +162,7 @@ def fitted(scheduler: CopterScheduler, begin: Route, **options: Any) -> Schedule
 GUESS = route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS))
 
 
-def test_commands_leads_groups_bounds_and_holds_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_setting_out_before_the_plan_is_found() -> None:
     begin = route_with(SPEEDS, WAITS)
     found = fitted(as_planned(begin, ahead=0.8), begin).route
     assert found.lead == pytest.approx(0.8, abs=0.1)
@@ -166,6 +172,9 @@ def test_commands_leads_groups_bounds_and_holds_are_found(monkeypatch: pytest.Mo
         begin, first=1, arrivals=as_planned(begin).flight(begin).flown.arrivals - 0.8
     )
     assert fitted(as_planned(begin, ahead=0.8), at_speed).route.lead == 0
+
+
+def test_groups_bounds_and_holds_are_kept() -> None:
     begin = route_with(SPEEDS, WAITS)
     speeds = fitted(as_planned(begin), begin, groups=np.array([0, 0, 1, 1])).route.speeds
     assert speeds[0] == speeds[1] != speeds[2] == speeds[3]
@@ -179,6 +188,9 @@ def test_commands_leads_groups_bounds_and_holds_are_found(monkeypatch: pytest.Mo
         scheduler_for(np.arange(5.0), np.zeros((5, 2))), route_with(np.zeros(0), np.array([7.0]))
     )
     assert alone.route.waits.tolist() == [7]
+
+
+def test_the_commands_that_made_a_flight_are_found_in_few(monkeypatch: pytest.MonkeyPatch) -> None:
     plan, fly, flights = as_planned(route_with(SPEEDS, WAITS)), ArduCopter.fly, []
 
     def counted(model: ArduCopter, path: FlightPath) -> Flown:
@@ -193,7 +205,10 @@ def test_commands_leads_groups_bounds_and_holds_are_found(monkeypatch: pytest.Mo
     assert again.deviation.max < 0.5
     assert len(flights) <= 6
 
-    # a flight without an end is not the one that fits
+
+def test_a_flight_without_an_end_is_not_the_one_that_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, fly = as_planned(route_with(SPEEDS, WAITS)), ArduCopter.fly
+
     def followed(model: ArduCopter, path: FlightPath) -> Flown:
         if not np.allclose(path.speeds, GUESS.speeds):
             raise InputError("the flight would take more than 21600 s")

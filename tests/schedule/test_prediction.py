@@ -128,7 +128,7 @@ COORDINATES = st.floats(-1e4, 1e4)
 PATHS = arrays(float, st.tuples(st.integers(1, 20), st.just(2)), elements=COORDINATES)
 
 
-def test_how_far_a_flight_is_in_time_and_in_space() -> None:
+def test_a_late_flight_is_off_in_time_and_not_in_space() -> None:
     t = np.linspace(0, 10, 101)
     planned = np.column_stack([8 * t, 0 * t])
     longer = np.linspace(0, 12, 121)
@@ -142,6 +142,9 @@ def test_how_far_a_flight_is_in_time_and_in_space() -> None:
     found = deviation(t, planned, t, short, 2.0)
     assert found.max == pytest.approx(40)
     assert math.isfinite(found.late)
+
+
+def test_the_path_counts_both_ways_and_to_its_end_at_speed() -> None:
     t = np.arange(3.0)
     straight, bent = (np.array([[0.0, 0], [50, far], [100, 0]]) for far in (0, 7))
     assert deviation(t, straight, t, bent, 1.0).path == pytest.approx(7)

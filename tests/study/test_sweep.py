@@ -111,10 +111,15 @@ def test_schemes_and_the_grid_of_every_plan_once() -> None:
         assert plan.optimizer.inputs == ("gaussian" if case.scheme == "gaussian" else "alphabet")
         assert plan.radio.seed == case.seed in (0, 1, 2)
         assert plan.study is None
-    # the same work has the same key whatever the study
+
+
+def test_the_same_work_has_the_same_key_whatever_the_study() -> None:
     wide = make_cases(SMALL, vary={"radio.rician_factor": (1, 2, 3)})
     narrow = make_cases(SMALL + "study: {seeds: 4}\n", vary={"radio.rician_factor": (2,)})
     assert narrow[0].key == wide[1].key
+
+
+def test_the_study_of_a_plan() -> None:
     text = SMALL + "study: {vary: {flight.duration: [10, 12]}, schemes: [faao, zf], seeds: 2}\n"
     study = parse_plan(text).study
     assert study is not None
@@ -122,6 +127,8 @@ def test_schemes_and_the_grid_of_every_plan_once() -> None:
     assert (study.schemes, study.seeds, study.figure) == (("faao", "zf"), 2, "delivered")
     assert parse_plan(SMALL).study is None
 
+
+def test_sample_studies_are_of_section_iv() -> None:
     paper = read_plan(MISSIONS / "paper_active.yaml")
     for name in ("paper_fig3", "paper_fig4", "gaussian_cost"):  # of Section IV
         plan = read_plan(MISSIONS / f"{name}.yaml")
@@ -153,7 +160,7 @@ def test_no_point_is_better_than_one_of_the_frontier(
     }
 
 
-def test_a_frontier_ends_at_the_plan_and_is_a_table() -> None:
+def test_the_points_of_a_frontier_end_at_the_plan() -> None:
     plan = parse_plan(edited(SMALL, {"radio.relay.power_dbm": 7.5, "goal": {"maximise": "rate"}}))
     times = [parse_plan(case.text) for case in frontier_cases(plan, "flight.duration", 4)]
     assert [each.flight.duration for each in times][-1] == plan.flight.duration
@@ -161,9 +168,15 @@ def test_a_frontier_ends_at_the_plan_and_is_a_table() -> None:
     powers = [parse_plan(case.text) for case in frontier_cases(plan, POWER, 3)]
     assert powers[-1].powers == pytest.approx(plan.powers)
     assert powers[0].powers == pytest.approx([power / 100 for power in plan.powers])
+
+
+def test_other_trade_offs_are_refused() -> None:
     for text in ("power", "data,power", "mass,data", "power,data,data"):
         with pytest.raises(InputError, match=r"--frontier .*duration,data or power,data"):
             parse_frontier(text)
+
+
+def test_the_table_has_the_points_of_the_frontier() -> None:
     plan, key = parse_plan(edited(SMALL, {"radio.bandwidth_mhz": 1})), "flight.duration"
     rows = [
         StudyRow("", {key: T}, "faao", 0, delivered=0.5, delivered_mbytes=data, error=error)
