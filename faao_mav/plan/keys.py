@@ -153,6 +153,8 @@ def unknown(above: str, name: str, *, dotted: bool = False) -> str:
     close = close or [each for each in known if each.rpartition(".")[2] == name]
     if close:
         return f"unknown key; did you mean {' or '.join(close)}?"
+    if dotted and not beside:
+        return "unknown key; give a dotted key of the plan, as radio.modulation"
     return f"unknown key; known here: {', '.join(sorted(beside))}"
 
 

@@ -190,7 +190,7 @@ def filled_in(data: dict[str, Any], source: str) -> dict[tuple[str, ...], str]:
             else:
                 most = MAX_BESIDE * (4 if path.suffix.lower() == ".gpx" else 1)  # wordier than CSV
                 section[key] = read(read_text(path, most, "text", PlanError), str(path))
-        except InputError as error:
+        except (InputError, OSError) as error:  # the latter of a name that no file can have
             place = f"{'.'.join(keys[:-1])}: {law}: {key}" if law else ".".join(keys)
             raise PlanError(f"{source}: {place}: {error}") from None
         files[keys] = str(path)

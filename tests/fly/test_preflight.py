@@ -253,8 +253,8 @@ def test_nothing_is_armed_past_the_gate_but_what_an_option_overrules(mission: Pa
         end = json.loads(result.stdout.splitlines()[-1])
         (here,) = (each for each in end["findings"] if each["rule"] == "place-home")
         assert (here["level"], here["action"]) == ("warning", "--elsewhere: flown all the same")
-    stands = [Whereabouts(19.9, up, None).is_meant for up in (9.9, -10.1, 10.1, None)]
-    assert stands == [True, False, False, True]
+    near = [Whereabouts(19.9, up, None).is_meant for up in (9.9, -10.1, 10.1, None)]
+    assert near == [True, False, False, True]
     with vehicle(place=1e9) as (to, _):
         told = run("upload", mission, "--to", to).stdout
         assert "stands       not known how far from the mission's home" in told
