@@ -236,9 +236,19 @@ class _Search:
 
 
 def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real) -> Complex:
-    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows."""
+    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows.
+
+    With known draws they are searched afresh too, and the better kept.
+    """
     H = link.channel(w)
     near = rate.initial_precoders(*link_coordinates(link, w.T)) if scheme.optimal else None
-    if near is not None and link.measure != "cutoff":
+    if near is None:
+        return scheme.precoders(link, H)
+    if link.measure != "cutoff":
         return near
-    return scheme.precoders(link, H, start=near)
+    carried = scheme.precoders(link, H, start=near)
+    if scheme.averaged or link.nlos is None:
+        return carried
+    afresh = scheme.precoders(link, H)
+    better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
+    return np.asarray(np.where(better[:, None, None], carried, afresh))
