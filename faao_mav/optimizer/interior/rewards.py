@@ -10,10 +10,13 @@ import numpy as np
 from faao_mav.arrays import PACKED, Flags, Real
 from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, Rows, W
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
-from faao_mav.radio.relay import RelayQueue, forward_greedily
+from faao_mav.radio.relay import RelayQueue, best_shares, forward_greedily
 
 _FLAT = 1e-9
 """A gain per 100 m, relative to the reward, that is not worth a detour. Chosen."""
+
+_LEAST_SHARE = 0.2
+"""The best shares are mostly 0 and 1; a warm search starts from them this far inside. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +54,7 @@ class Goal(Constraint):
     after: Real = np.zeros((0, 0))
 
     @abstractmethod
-    def begin(self) -> Real:
+    def begin(self, *, cold: bool) -> Real:
         """Return its unknowns (own, n) to begin with."""
 
     def free(self, slots: int) -> Flags:
@@ -85,7 +88,7 @@ class Rewards(Goal):
         rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1).max()
         self.noise = 1e-9 + rounding / self.unit
 
-    def begin(self) -> Real:
+    def begin(self, *, cold: bool) -> Real:  # noqa: ARG002
         """Return no unknowns."""
         return np.zeros((0, self.base.shape[-1]))
 
@@ -126,11 +129,15 @@ class Queue(Goal):
         self.after = np.eye(1, self.own)
         self.before = np.array([[1.0, 1.0, -1.0, 0.0]])[:, : self.own]
 
-    def begin(self) -> Real:
+    def begin(self, *, cold: bool) -> Real:
         """Return q, r, f and x: what is forwarded greedily."""
-        I_U, I_G = self.rewards.base / self.rewards.unit
+        rates = self.rewards.base
+        I_U, I_G = rates / self.rewards.unit
         n = len(I_U)
         x = np.full(n, 0.5) if self.relay.half else np.ones(n)
+        if self.relay.half and not cold:
+            room = self.buffer * self.rewards.unit
+            x = np.clip(best_shares(rates[0], rates[1], room), _LEAST_SHARE, 1 - _LEAST_SHARE)
         found = forward_greedily(x * I_U, (1 - x if self.relay.half else x) * I_G, self.buffer)
         own = np.stack([found.queue, found.received, found.forwarded, x])[: self.own]
         return np.asarray(own * self.free(n))

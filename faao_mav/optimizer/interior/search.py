@@ -100,7 +100,7 @@ class Search:
     ) -> None:
         """Begin at x with the barrier parameter `mu`, `WARM` where x is nearly optimal."""
         self.goal, self.tolerance, self.mu = goal, tolerance, mu
-        x = np.concatenate([x, goal.begin()])
+        x = np.concatenate([x, goal.begin(cold=mu > WARM)])
         self.system = system = System(Grid.of(kin), goal, constraints, x)
         at = system.at(x)
         s = np.maximum(at.values, (1.0 if mu > WARM else _WARM_ROOM) * system.headroom)
