@@ -31,6 +31,8 @@ class Parameter:
     'WPNAV_SPEED'
     >>> speed.written(7.5, "WPNAV_SPEED"), speed.written(7.5, "WP_SPD")
     (750, 7.5)
+    >>> Parameter("rally_limit", "m", 300.0, {"RALLY_LIMIT_KM": 1e3}).written(300, "RALLY_LIMIT_KM")
+    0.3
     """
 
     key: str
@@ -75,10 +77,10 @@ class Parameter:
     def written(self, value: float, name: str) -> float:
         """Return `value`, in `unit`, as the autopilot's number under `name`.
 
-        Centimetres and the like are whole numbers.
+        Centimetres and the like are whole numbers, kilometres are not.
         """
         factor = self.names[name]
-        return value if factor == 1.0 else round(value / factor)
+        return round(value / factor) if factor < 1.0 else value / factor
 
 
 ParameterTable: TypeAlias = Mapping[str, Parameter]
