@@ -86,10 +86,11 @@ def direct(
         better = [name for name in routes if values[name] > begun[name]]
         flights |= {name: improved[name] for name in better}
         reached |= {name: values[name] for name in better}
-    likely = dict.fromkeys(search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
-    going = list(likely)
     if problem.mapped:
         going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]
+    else:
+        equal = (search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
+        going = list(dict.fromkeys(equal))
     tell(2, "the best start", reached[going[0]])
     optima = {name: search.followed(flights[name], warm=several) for name in going}
     ends = {name: optimum.trajectory for name, optimum in optima.items()}
