@@ -13,7 +13,7 @@ RealOrComplex: TypeAlias = Real | Complex
 
 
 CACHE = 1 << 17
-"""Numbers of a megabyte: work on large arrays goes through parts that stay in a cache. Chosen."""
+"""How many numbers are worked on at once, a megabyte: they stay in a processor's cache. Chosen."""
 
 PACKED = np.array([[0, 1], [1, 2]])
 """Which of the entries xx, xy, yy stand where in the matrix."""
