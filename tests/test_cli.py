@@ -114,10 +114,14 @@ def test_one_pass_through_every_command(plan: Path, out: Path, tmp_path: Path) -
         flown = run("fly", out, "--to", to, "--solution", save, "--arm", "--stream", "--json",
                     "--log", log, "--radio", f"udp:127.0.0.1:{port}")  # fmt: skip
         assert flown.exit_code == 0, flown.output
-        slots = []  # on a busy machine not all of the 32 are told
+        heard = []  # on a busy machine not all of the 32 are told
         while select.select([radio], [], [], 0.1)[0]:
-            slots.append(json.loads(radio.recv(65_536))["slot"])
+            heard.append(json.loads(radio.recv(65_536)))
+    slots, planned = [line["slot"] for line in heard], np.load(save)["w"]
     assert all(slot != then for slot, then in pairwise(slots))  # back if it is led back
+    timed = [line for line in heard if line["t"] is not None]
+    away = [np.hypot(*(planned[line["slot"]] - (line["east"], line["north"]))) for line in timed]
+    assert max(away) < 6  # m: within a slot's way, 5 m, a slot is that of the place
     assert len(slots) > 4
     *lines, end = map(json.loads, flown.stdout.splitlines())
     assert (end["ending"], slots[0]) == ("finished", 0)
