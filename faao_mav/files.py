@@ -8,7 +8,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from importlib import resources
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -291,16 +291,19 @@ def _umask() -> int:
     return mask
 
 
-def table(name: str) -> Iterator[dict[str, str]]:
-    """Yield the rows of the table `name` of this package by their columns; "-" is nothing.
+@cache
+def table(name: str) -> tuple[Mapping[str, str], ...]:
+    """Return the rows of the table `name` of this package by their columns; "-" is nothing.
 
-    >>> next(table("autopilot/failsafes.tsv"))["loss"]
+    >>> table("autopilot/failsafes.tsv")[0]["loss"]
     'RC lost'
     """
-    text = resources.files("faao_mav").joinpath(name).read_text(encoding="utf-8")
+    text = (Path(__file__).parent / name).read_text(encoding="utf-8")
     head, *rows = (line.split("\t") for line in text.splitlines())
-    for row in rows:
-        yield {key: "" if each == "-" else each for key, each in zip(head, row, strict=True)}
+    return tuple(
+        {key: "" if each == "-" else each for key, each in zip(head, row, strict=True)}
+        for row in rows
+    )
 
 
 class Numbers:

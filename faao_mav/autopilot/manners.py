@@ -258,12 +258,12 @@ def failsafes(vehicle: str) -> tuple[Failsafe, ...]:
     >>> [each.loss for each in failsafes("arduplane")]
     ['RC lost', 'ground station lost', 'battery low']
     """
-    found: dict[str, list[dict[str, str]]] = {}
+    found: dict[str, list[Mapping[str, str]]] = {}
     for row in table("autopilot/failsafes.tsv"):
         if row["vehicle"] == vehicle:
             found.setdefault(row["loss"], []).append(row)
 
-    def numbers(stages: list[dict[str, str]], column: str) -> Values:
+    def numbers(stages: list[Mapping[str, str]], column: str) -> Values:
         pairs = (each.split("=") for stage in stages for each in stage[column].split())
         return {name: float(value) if "." in value else int(value) for name, value in pairs}
 

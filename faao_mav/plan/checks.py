@@ -4,13 +4,13 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from faao_mav.autopilot import vehicle_types
 from faao_mav.errors import quote
+from faao_mav.files import table
 from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Problem, listed, wrong
 from faao_mav.plan.keys import not_varied, varied_twice
@@ -36,8 +36,7 @@ def problems(plan: PlanContents) -> Iterator[str]:
 
     Which it is a check yields by its row of `problems.tsv`, with the values that are said there.
     """
-    lines = files("faao_mav.plan").joinpath("problems.tsv").read_text(encoding="utf-8")
-    says = dict(line.split("\t") for line in lines.splitlines())
+    says = {row["problem"]: row["says"] for row in table("plan/problems.tsv")}
     checks = _vehicle, _goal, _together, _speeds, _gain, _rates, _steps, _stations, _distance
     for check in (*checks, _power, fence_problems, _study):
         for problem, values in check(plan):

@@ -15,7 +15,7 @@ from faao_mav.validate.context import ValidationContext as ValidationContext
 from faao_mav.validate.demands import EnergyUse, energy_use
 from faao_mav.validate.demands import Limits as Limits
 from faao_mav.validate.demands import LinkCheck as LinkCheck
-from faao_mav.validate.rule import CHECKS, bound, read_rules
+from faao_mav.validate.rule import CHECKS, read_rules, threshold
 from faao_mav.validate.rule import Finding as Finding
 from faao_mav.validate.rule import Level as Level
 from faao_mav.validate.rule import Rule as Rule
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from faao_mav.optimizer.solution import Solution
     from faao_mav.schedule.prediction import Prediction
 
-_CONSTANTS: dict[str, object] = {"bound": bound, "spare": 100 * (OVERSPEED - 1)}
+_CONSTANTS: dict[str, object] = {"threshold": threshold, "spare": 100 * (OVERSPEED - 1)}
 
 RULES = tuple(read_rules("validate/rules.tsv", _CONSTANTS))
 """All rules, in the order of their table, in which findings about one item are given."""

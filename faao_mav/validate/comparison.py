@@ -19,7 +19,7 @@ from faao_mav.schedule.route import begins_at_speed
 from faao_mav.schedule.timing import MOST_LEAD
 from faao_mav.validate.demands import LATE_START, LinkCheck
 from faao_mav.validate.flown import Line, departure
-from faao_mav.validate.rule import bound
+from faao_mav.validate.rule import threshold
 from faao_mav.vector import distances_to_path, lengths
 
 # Seconds about a departure like the plan's, of which the best fit is taken. A mission sets out up
@@ -51,7 +51,7 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
         altitude_error=line.altitude_error(solution),
         unmeasured=tuple(_unmeasured(solution)),
         off_map=_off_map(plan, line),
-        away=float(distances_to_path(line.w[:: int(bound.every)], solution.w).min()),
+        away=float(distances_to_path(line.w[:: int(threshold.every)], solution.w).min()),
         begins=float(track.t[0] - line.t[0]),
         late_share=_late_share(solution, flown),
     )
@@ -60,7 +60,7 @@ def compare_with_plan(solution: Solution, track: Track) -> tuple[LinkCheck, Pred
 
 def _off_map(plan: Plan, line: Line) -> str:
     """Return where the predicted flight first is in ground or off a map of the gain; "" nowhere."""
-    aloft = line.up > plan.flight.altitude - bound.lower
+    aloft = line.up > plan.flight.altitude - threshold.lower
     t, w = line.t[aloft], line.w[aloft]
     low, high = plan.map_edge or ((-np.inf, -np.inf), (np.inf, np.inf))
     off = ((w < low) | (w > high)).any(axis=1)
@@ -92,13 +92,13 @@ def _unmeasured(solution: Solution) -> Iterator[str]:
         away = lengths(solution.w - station.at(solution.t))
         angle, d = np.degrees(np.arctan2(height, away)), np.hypot(away, height)
         low, high = law.elevation_deg or (-np.inf, np.inf)
-        beyond = np.maximum(low - angle, angle - high) > bound.unmeasured_angle
-        if np.mean(beyond) > bound.unmeasured_share:
+        beyond = np.maximum(low - angle, angle - high) > threshold.unmeasured_angle
+        if np.mean(beyond) > threshold.unmeasured_share:
             seen = f"the {name} sees the route {angle.min():.0f} to {angle.max():.0f} degrees high"
             yield f"{seen}; the gain was measured from {low:.0f} to {high:.0f}"
         near, far = law.distance_m or (0.0, np.inf)
-        beyond = (d * bound.unmeasured_factor < near) | (d > far * bound.unmeasured_factor)
-        if np.mean(beyond) > bound.unmeasured_share:
+        beyond = (d * threshold.unmeasured_factor < near) | (d > far * threshold.unmeasured_factor)
+        if np.mean(beyond) > threshold.unmeasured_share:
             seen = f"the route is {d.min():.0f} to {d.max():.0f} m from the {name}"
             yield f"{seen}; the gain was measured from {near:.0f} to {far:.0f} m"
 

@@ -7,7 +7,7 @@ import numpy as np
 from faao_mav.mission.command import HOLDING, LANDINGS, TAKEOFFS, Command
 from faao_mav.power import JOULES_PER_WH
 from faao_mav.validate.context import HOME, ValidationContext
-from faao_mav.validate.rule import Hits, bound, checks, hit
+from faao_mav.validate.rule import Hits, checks, hit, threshold
 
 
 @checks
@@ -20,7 +20,7 @@ def _beyond(context: ValidationContext) -> Hits:
     for place in context.places:
         away = place.from_origin if context.home is not None else 0.0
         for rule, reached, limit in (
-            ("too-high", place.up, bound.highest),
+            ("too-high", place.up, threshold.highest),
             ("above-ceiling", place.up, limits.max_altitude or math.inf),
             ("beyond-distance", away, limits.max_distance or math.inf),
             ("ardupilot-fence-ceiling", place.up, high),
@@ -40,7 +40,7 @@ def _heights(context: ValidationContext) -> Hits:
         command = context.items[place.index].command
         if place.up < 0 and command not in LANDINGS | TAKEOFFS:
             yield hit("below-home", place.index, below=-place.up)
-        elif place.up < bound.least_height and command not in LANDINGS:
+        elif place.up < threshold.least_height and command not in LANDINGS:
             yield hit("near-ground", place.index, place=place)
         if place.up < floor and command != Command.NAV_LAND:
             yield hit("ardupilot-fence-floor", place.index, place=place, limit=floor)
@@ -49,7 +49,7 @@ def _heights(context: ValidationContext) -> Hits:
         newest = context.vehicle.type.parameters["return_height"].newest_name
         yield hit("return-above-ceiling", height=height, name=name, newest=newest)
     above = (
-        place for place in context.places if place.up > bound.common_ceiling and ceiling is None
+        place for place in context.places if place.up > threshold.common_ceiling and ceiling is None
     )
     if (highest := max(above, key=lambda place: place.up, default=None)) is not None:
         yield hit("above-120-m", highest.index, place=highest)
@@ -59,19 +59,25 @@ def _heights(context: ValidationContext) -> Hits:
 def _distances(context: ValidationContext) -> Hits:
     """How far the places are from home, and from each other."""
     home, hovers = context.mission.home, context.vehicle.type.hovers
-    farthest = 1000 * (bound.farthest_copter if hovers else bound.farthest_plane)
+    farthest = 1000 * (threshold.farthest_copter if hovers else threshold.farthest_plane)
     for place in context.places if home is not None else ():
         away, item = place.from_origin, context.items[place.index]
         if home is not None and away > farthest:
-            swapped = math.hypot(item.x - home.longitude, item.y - home.latitude) < bound.swapped
+            swapped = (
+                math.hypot(item.x - home.longitude, item.y - home.latitude) < threshold.swapped
+            )
             slip = "latitude and longitude look exchanged: correct them"
             told = {"away": away / 1000, "slip": slip if swapped else "correct it"}
             yield hit("too-far", place.index, **told)
-        elif context.limits.max_distance is None and away > 1000 * bound.far:
+        elif context.limits.max_distance is None and away > 1000 * threshold.far:
             yield hit("far-from-home", place.index, away=away / 1000)
     for leg in context.legs:
         near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
-        if leg.length > 1000 * bound.far and near and HOME not in (leg.start.index, leg.end.index):
+        if (
+            leg.length > 1000 * threshold.far
+            and near
+            and HOME not in (leg.start.index, leg.end.index)
+        ):
             yield hit("long-leg", leg.index, leg=leg, length=leg.length / 1000)
 
 
@@ -88,7 +94,7 @@ def _predicted(context: ValidationContext) -> Hits:
         (limits.max_duration, track.t, "s long; --max-duration"),
     ):
         worst = int(np.argmax(flown))
-        if limit is not None and flown[worst] > limit + bound.wobble:
+        if limit is not None and flown[worst] > limit + threshold.wobble:
             told = {"worst": flown[worst], "what": what, "limit": limit}
             yield hit("predicted-beyond", int(track.item[worst]), **told)
 

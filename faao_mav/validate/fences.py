@@ -13,7 +13,7 @@ from faao_mav.arrays import Flags
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence_area import FreeArea, areas_of, free_area
 from faao_mav.validate.context import ValidationContext
-from faao_mav.validate.rule import Hits, bound, checks, hit
+from faao_mav.validate.rule import Hits, checks, hit, threshold
 
 Shapes: TypeAlias = NDArray[np.object_]
 """Geometries of the local frame."""
@@ -120,7 +120,9 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
         k, margin = nearest
         index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
         yield hit(
-            "fence-close" if margin < bound.least_margin else "fence-margin", index, margin=margin
+            "fence-close" if margin < threshold.least_margin else "fence-margin",
+            index,
+            margin=margin,
         )
         keep, name = context.parameter("fence_margin")
         if margin < keep:
@@ -155,9 +157,9 @@ def _kept(context: ValidationContext, fence: _Fence) -> Hits:
     speed = np.abs(velocity)
     ahead = vehicle.type.fence_ahead(vehicle, speed)
     if ahead.any():
-        there = context.flown + velocity / np.maximum(speed, bound.still) * ahead
+        there = context.flown + velocity / np.maximum(speed, threshold.still) * ahead
         tested = np.asarray(shapely.points(there.real, there.imag))
-        for index, k in _firsts(fence.leave(tested) & (speed > bound.still), track.item):
+        for index, k in _firsts(fence.leave(tested) & (speed > threshold.still), track.item):
             yield hit("fence-ahead", index, time=track.t[k], speed=speed[k], ahead=ahead[k])
 
 

@@ -13,7 +13,7 @@ from faao_mav.optimizer.solution import Solution
 from faao_mav.schedule.prediction import Prediction, positions_at, price_flight
 from faao_mav.schedule.route import set_out
 from faao_mav.schedule.timing import MOST_LEAD
-from faao_mav.validate.rule import bound
+from faao_mav.validate.rule import threshold
 from faao_mav.vector import distances_to_path, lengths
 
 
@@ -183,7 +183,7 @@ def plan_start(solution: Solution, predicted: Line, flight: Line) -> float | Non
     """
     lines = (predicted, Line.planned(solution))
     off, start = min(departure(solution, line, flight) for line in lines)
-    return start if off <= bound.alike else None
+    return start if off <= threshold.alike else None
 
 
 def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, float]:
@@ -192,10 +192,10 @@ def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, floa
     How far it is from it, as a share of the way looked at, and when the clock of `line` read 0.
     """
     begin = set_out(solution.t, solution.w, solution.plan) - float(solution.t[0]) - MOST_LEAD
-    begin = max(begin - bound.before, float(line.t[0]))
+    begin = max(begin - threshold.before, float(line.t[0]))
     after = line.t > begin
     away = lengths(line.w[after] - solution.w[0])
-    reach = min(bound.reach, float(away.max()) / 2)
+    reach = min(threshold.reach, float(away.max()) / 2)
     end = float(line.t[after][np.argmax(away >= reach)])
     t = np.linspace(begin, end, max(2, round((end - begin) / 0.2)))
     w = line.at(t)
@@ -208,12 +208,14 @@ def departure(solution: Solution, line: Line, flight: Line) -> tuple[float, floa
         at = flight.at((starts[:, None] + t).ravel()).reshape(len(starts), *w.shape)
         return np.asarray(np.mean(np.sum((at - w) ** 2, axis=-1), axis=-1))
 
-    coarse = np.arange(first, last + bound.coarse, bound.coarse)
+    coarse = np.arange(first, last + threshold.coarse, threshold.coarse)
     around = coarse[lengths(flight.at(coarse + begin) - w[0]) < reach]
     if not len(around):
         return math.inf, 0.0
     near = around[squares(around).argmin()]
-    fine = np.clip(near + np.arange(-2 * bound.coarse, 2 * bound.coarse, bound.fine), first, last)
+    fine = np.clip(
+        near + np.arange(-2 * threshold.coarse, 2 * threshold.coarse, threshold.fine), first, last
+    )
     found = squares(fine)
     return math.sqrt(found.min()) / reach, float(fine[found.argmin()])
 
@@ -232,7 +234,7 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
     step = float(solution.t[1] - solution.t[0])
     slot = int(np.clip(now / step, 0, len(solution.t) - 1))
     forwarded, time_up = step * priced.relayed.forwarded, now >= solution.plan.flight.duration
-    around_end = flight.w[flight.t >= ends - bound.around_end]
+    around_end = flight.w[flight.t >= ends - threshold.around_end]
     return Standing(
         time=now,
         late=behind,
@@ -242,7 +244,7 @@ def standing(solution: Solution, predicted: Line, flight: Line) -> Standing:
         I_G=float(priced.I_G[slot]),
         delivered=float(forwarded[: None if time_up else slot].sum()),
         expected=float(forwarded.sum()),
-        over=time_up and bool((lengths(around_end - solution.w[-1]) < bound.at_end).any()),
+        over=time_up and bool((lengths(around_end - solution.w[-1]) < threshold.at_end).any()),
     )
 
 
@@ -250,4 +252,4 @@ def late(solution: Solution, now: float, place: Real) -> float:
     """Return by how many seconds an aircraft at `place` (2,), m, is later than planned at `now`."""
     t = np.arange(0.0, float(solution.t[-1]) + 0.05, 0.1)
     apart = lengths(Line.planned(solution).at(t) - place)
-    return now - float(t[np.argmin(apart + bound.metres_per_second * np.abs(t - now))])
+    return now - float(t[np.argmin(apart + threshold.metres_per_second * np.abs(t - now))])

@@ -12,7 +12,7 @@ from faao_mav.mission.command import (
     Command,
 )
 from faao_mav.validate.context import LARGEST, ValidationContext, fits_message
-from faao_mav.validate.rule import Hits, bound, checks, hit
+from faao_mav.validate.rule import Hits, checks, hit, threshold
 
 _LANDING_SEQUENCES = (Command.DO_LAND_START, 188)
 _ENDINGS = (*LANDINGS, Command.NAV_RETURN_TO_LAUNCH, Command.NAV_LOITER_UNLIM)
@@ -26,7 +26,7 @@ def _beside(context: ValidationContext) -> Hits:
         yield hit("empty")
     if context.items and home is None:
         yield hit("no-home")
-    if home is not None and not bound.lowest_land <= home.altitude <= bound.highest_land:
+    if home is not None and not threshold.lowest_land <= home.altitude <= threshold.highest_land:
         told = f"home is {home.altitude:,.0f} m above sea level, where no land is"
         if math.isnan(home.altitude):
             told = "the file has no height of home: heights above sea level are not checked"

@@ -9,7 +9,7 @@ from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF
 from faao_mav.files import table
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
 from faao_mav.validate.context import HOME, NAV_LAST, Straight, ValidationContext, at_zero
-from faao_mav.validate.rule import Hits, bound, checks, hit
+from faao_mav.validate.rule import Hits, checks, hit, threshold
 
 _SKIPPED = {
     kind: {
@@ -67,7 +67,7 @@ def _ardupilot_takeoff(context: ValidationContext) -> Hits:
     if 0 < before <= min(takeoffs, default=0):
         yield hit("ardupilot-takeoff-first", takeoffs[0], before=before)
     for k, item in context.each(Command.DO_SET_HOME):
-        same_height = item.params[0] == 0 and abs(context.height(item)) < bound.home_moved
+        same_height = item.params[0] == 0 and abs(context.height(item)) < threshold.home_moved
         if not same_height and (context.airborne or min(takeoffs, default=k) < k):
             yield hit("ardupilot-set-home", k)
 
@@ -182,7 +182,7 @@ def _px4_takeoff(context: ValidationContext) -> Hits:
 def _landing(context: ValidationContext) -> Hits:
     """The approach to a landing: it starts above it, outside its own orbit, and is not steep."""
     angle = math.degrees(context.value("landing_angle"))
-    slope = math.tan(math.radians(angle + bound.spare_angle))
+    slope = math.tan(math.radians(angle + threshold.spare_angle))
     by_index = {place.index: place for place in context.places}
     for k, _ in context.each(Command.NAV_LAND):
         item = context.items[max(k - 1, 0)]
@@ -238,14 +238,14 @@ def _radius(context: ValidationContext) -> Hits:
         held = context.items[leg.index].params[0] > 0  # it is held at all the same
         if leg.start.index != HOME and 0.05 <= leg.length <= radius and not held:
             yield hit("px4-radius-covers-leg", leg.index, leg=leg, radius=radius)
-        if radius < bound.smallest_radius:
+        if radius < threshold.smallest_radius:
             yield hit("px4-radius-small", leg.index, radius=radius)
     for (leg, radius), (onward, smaller) in pairwise(_radii(context)):
         passed = leg.end is onward.start and not context.items[leg.index].params[0] > 0
         if (
             passed
-            and radius > smaller + bound.narrower
-            and leg.turn(onward) > math.radians(bound.straight)
+            and radius > smaller + threshold.narrower
+            and leg.turn(onward) > math.radians(threshold.straight)
         ):
             told = {"radius": radius, "smaller": smaller, "onward": onward.end}
             yield hit("px4-radius-narrows", leg.index, **told)

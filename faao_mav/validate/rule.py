@@ -83,15 +83,15 @@ class Rule:
         return Finding(self.level, self.id, None if index is None else index + 1, says, do)
 
 
-bound = numbers("validate/thresholds.tsv")
+threshold = numbers("validate/thresholds.tsv")
 """The thresholds of the rules, by their names in the table `thresholds.tsv`."""
 
 
 def read_rules(name: str, constants: Mapping[str, object]) -> Iterator[Rule]:
     """Yield the rules of the table `name`; a summary may name `constants` in braces."""
     for row in table(name):
-        level, summary = Level(row.pop("level")), row.pop("summary", "").format_map(constants)
-        yield Rule(level=level, summary=summary, **row)
+        told = {**row, "summary": row.get("summary", "").format_map(constants)}
+        yield Rule(level=Level(told.pop("level")), **told)
 
 
 Hit: TypeAlias = tuple[str, int | None, dict[str, object]]

@@ -14,7 +14,7 @@ from faao_mav.errors import counted
 from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
 from faao_mav.validate.context import HOME, Straight, ValidationContext
-from faao_mav.validate.rule import Hits, bound, checks, hit
+from faao_mav.validate.rule import Hits, checks, hit, threshold
 from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def beyond_lean(solution: "Solution", vehicle: Vehicle) -> str | None:
     push = np.maximum(*(lengths(solution.a[:-1] + each) for each in (drag[:-1], drag[1:])))
     allowed, slot = vehicle.value("lean_angle"), float(solution.t[1])
     missing = np.maximum(push - lean_acceleration(allowed), 0.0)
-    if slot * missing.sum() < bound.missing:
+    if slot * missing.sum() < threshold.missing:
         return None
     return (
         f"the plan asks for a lean of up to {math.degrees(math.atan(push.max() / GRAVITY)):.0f} "
@@ -85,22 +85,22 @@ def beyond_lean(solution: "Solution", vehicle: Vehicle) -> str | None:
 def _slow(context: ValidationContext) -> Hits:
     """Runs of neighbouring legs that stay below their commanded speed."""
     pairs = _reached_speeds(context)
-    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < bound.reached * pair[0].speed):
+    for slow, run in groupby(pairs, lambda pair: 100 * pair[1] < threshold.reached * pair[0].speed):
         if not slow:
             continue
         legs, reached = zip(*run, strict=True)
         mean, commanded = float(np.mean(reached)), float(np.mean([leg.speed for leg in legs]))
         told = {"asked": max(leg.speed for leg in legs)}
         lost = sum(
-            leg.length * (1 / max(v, bound.slowest) - 1 / leg.speed)
+            leg.length * (1 / max(v, threshold.slowest) - 1 / leg.speed)
             for leg, v in zip(legs, reached, strict=True)
         )
-        if len(legs) >= bound.crawl_legs and 100 * mean < bound.crawl * commanded:
+        if len(legs) >= threshold.crawl_legs and 100 * mean < threshold.crawl * commanded:
             spacing = float(np.mean([leg.length for leg in legs]))
             told |= {"count": len(legs), "last": legs[-1].index + 1, "spacing": spacing}
             yield hit("crawl", legs[0].index, mean=mean, **told)
         # A plan may ask for a speed that only the next leg reaches: link-timing judges that.
-        elif lost >= bound.time_lost and context.link is None:
+        elif lost >= threshold.time_lost and context.link is None:
             where = f"on this leg of {legs[0].length:.0f} m"
             if len(legs) > 1:
                 where = f"on the {len(legs)} legs from here to item {legs[-1].index + 1}"
@@ -122,7 +122,7 @@ def _reached_speeds(context: ValidationContext) -> Iterator[tuple[Straight, floa
 
 
 def _long_legs(context: ValidationContext) -> Iterator[Straight]:
-    return (leg for leg in context.legs if leg.length >= bound.shortest)
+    return (leg for leg in context.legs if leg.length >= threshold.shortest)
 
 
 @checks
@@ -164,11 +164,11 @@ def _turns(context: ValidationContext) -> Hits:
     """Corners for which a copter slows down, and those that a plane cannot fly."""
     bank, sharp = context.value("roll_limit"), []
     for before, after, turn in _corners(context):
-        if before.speed > bound.slow and math.degrees(turn) > bound.sharp:
+        if before.speed > threshold.slow and math.degrees(turn) > threshold.sharp:
             sharp.append((turn, -before.index, before))
         radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
         needed, room = (
-            radius * math.tan(min(turn, math.radians(bound.reversal)) / 2),
+            radius * math.tan(min(turn, math.radians(threshold.reversal)) / 2),
             min(before.length, after.length),
         )
         if needed > room:
@@ -187,7 +187,7 @@ def _steep(context: ValidationContext) -> Hits:
     for leg in _long_legs(context):
         way, limit = ("climbs", climb) if leg.rise > 0 else ("descends", descent)
         level, vertical = leg.length / leg.speed, abs(leg.rise) / limit
-        steep = math.isfinite(vertical) and level < bound.climb_share * vertical
+        steep = math.isfinite(vertical) and level < threshold.climb_share * vertical
         if steep and leg.index in waypoints and leg.start.index != HOME:
             told = {"rise": abs(leg.rise), "limit": limit, "vertical": vertical, "level": level}
             yield hit(
