@@ -30,12 +30,10 @@ def _link(context: ValidationContext) -> Hits:
     percent = 100 * link.share
     if percent < threshold.good:
         yield hit("link-rate-reduced", percent=percent)
+    late = max(threshold.late, threshold.late_share / 100 * link.planned_duration)
     for rule, holds in (
         ("link-path", link.path_error > link.path_tolerance + threshold.path_allowance),
-        (
-            "link-late",
-            link.late > max(threshold.late, threshold.late_share / 100 * link.planned_duration),
-        ),
+        ("link-late", link.late > late),
         ("link-apart", link.rms_position_error > threshold.apart),
         ("link-altitude", link.altitude_error > threshold.altitude_error),
     ):

@@ -167,10 +167,8 @@ def _turns(context: ValidationContext) -> Hits:
         if before.speed > threshold.slow and math.degrees(turn) > threshold.sharp:
             sharp.append((turn, -before.index, before))
         radius = before.speed * before.speed / (GRAVITY * math.tan(bank))
-        needed, room = (
-            radius * math.tan(min(turn, math.radians(threshold.reversal)) / 2),
-            min(before.length, after.length),
-        )
+        needed = radius * math.tan(min(turn, math.radians(threshold.reversal)) / 2)
+        room = min(before.length, after.length)
         if needed > room:
             told = {"turn": math.degrees(turn), "bank": math.degrees(bank), "needed": needed}
             yield hit("turn-too-tight", before.index, leg=before, room=room, **told)

@@ -6,7 +6,7 @@ are one less on the wire.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -188,26 +188,34 @@ def compare(
     if len(sent) != len(found):
         given, there = (len(items[home:]) for items in (sent, found))
         differences.append(Difference(part, None, "count", given, there, "wrong"))
-    flown, dialect = part is MissionType.MISSION, None if vehicle is None else vehicle.dialect
-    for index, pair in enumerate(zip(sent[home:], found[home:], strict=False)):
-        one, other = map(mission_item, pair)
-        known = not flown or dialect is None or dialect.is_known(one.command)
-        stored = one if dialect is None else dialect.stored(one)
-        values = [
-            (each.command, each.frame, each.autocontinue, *each.numbers)
-            for each in (one, other, stored)
-        ]
-        for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
-            unset = math.isnan(was) and is_ == 0
-            idle = field == "autocontinue" and not flown
-            lost = _same(field, kept, is_, other.frame)
-            if unset or idle or _same(field, was, is_, one.frame) or (lost and field == "frame"):
-                continue
-            # What is not known to be kept may be lost, but not replaced.
-            lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
-            kind: Literal["dropped", "wrong"] = "dropped" if lost else "wrong"
-            differences.append(Difference(part, index, field, was, is_, kind))
+    for index, (one, other) in enumerate(zip(sent[home:], found[home:], strict=False)):
+        differences += _compare(mission_item(one), mission_item(other), index, part, vehicle)
     return tuple(differences)
+
+
+def _compare(
+    sent: MissionItem,
+    found: MissionItem,
+    index: int,
+    part: MissionType,
+    vehicle: VehicleType | None,
+) -> Iterator[Difference]:
+    flown = part is MissionType.MISSION
+    known = not flown or vehicle is None or vehicle.dialect.is_known(sent.command)
+    stored = sent if vehicle is None else vehicle.dialect.stored(sent)
+    values = [
+        (each.command, each.frame, each.autocontinue, *each.numbers)
+        for each in (sent, found, stored)
+    ]
+    for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
+        unset = math.isnan(was) and is_ == 0
+        idle = field == "autocontinue" and not flown
+        lost = _same(field, kept, is_, found.frame)
+        if unset or idle or _same(field, was, is_, sent.frame) or (lost and field == "frame"):
+            continue
+        # What is not known to be kept may be lost, but not replaced.
+        lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
+        yield Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:
