@@ -58,26 +58,20 @@ def _heights(context: ValidationContext) -> Hits:
 @checks
 def _distances(context: ValidationContext) -> Hits:
     """How far the places are from home, and from each other."""
-    home, hovers = context.mission.home, context.vehicle.type.hovers
+    home, hovers, far = context.mission.home, context.vehicle.type.hovers, 1000 * threshold.far
     farthest = 1000 * (threshold.farthest_copter if hovers else threshold.farthest_plane)
     for place in context.places if home is not None else ():
         away, item = place.from_origin, context.items[place.index]
         if home is not None and away > farthest:
-            swapped = (
-                math.hypot(item.x - home.longitude, item.y - home.latitude) < threshold.swapped
-            )
+            off = math.hypot(item.x - home.longitude, item.y - home.latitude)
             slip = "latitude and longitude look exchanged: correct them"
-            told = {"away": away / 1000, "slip": slip if swapped else "correct it"}
-            yield hit("too-far", place.index, **told)
-        elif context.limits.max_distance is None and away > 1000 * threshold.far:
+            slip = slip if off < threshold.swapped else "correct it"
+            yield hit("too-far", place.index, away=away / 1000, slip=slip)
+        elif context.limits.max_distance is None and away > far:
             yield hit("far-from-home", place.index, away=away / 1000)
     for leg in context.legs:
         near = max(leg.start.from_origin, leg.end.from_origin) <= farthest
-        if (
-            leg.length > 1000 * threshold.far
-            and near
-            and HOME not in (leg.start.index, leg.end.index)
-        ):
+        if near and leg.length > far and HOME not in (leg.start.index, leg.end.index):
             yield hit("long-leg", leg.index, leg=leg, length=leg.length / 1000)
 
 

@@ -119,11 +119,8 @@ def _ways(context: ValidationContext, fence: _Fence) -> Hits:
     if nearest is not None:
         k, margin = nearest
         index = [*(leg.index for leg in context.legs), *context.circles, *heading.tolist()][k]
-        yield hit(
-            "fence-close" if margin < threshold.least_margin else "fence-margin",
-            index,
-            margin=margin,
-        )
+        rule = "fence-close" if margin < threshold.least_margin else "fence-margin"
+        yield hit(rule, index, margin=margin)
         keep, name = context.parameter("fence_margin")
         if margin < keep:
             yield hit("ardupilot-fence-margin", index, margin=margin, keep=keep, name=name)

@@ -137,10 +137,15 @@ def line_of(group: Sequence[Finding]) -> str:
 
 
 def said_of(group: Sequence[Finding]) -> str:
-    """Return the line of `line_of` without the level."""
-    numbers = items_of(group)
-    plural = "" if numbers.isdigit() else "s"
-    where = f"item{plural} {numbers}: " if numbers else ""
+    """Return the line of `line_of` without the level; runs of items as `4-9`."""
+    items = sorted({finding.item for finding in group if finding.item is not None})
+    runs = []
+    for _, run in groupby(enumerate(items), lambda pair: pair[1] - pair[0]):
+        first, *rest = (item for _, item in run)
+        runs.append(f"{first}-{rest[-1]}" if rest else str(first))
+    if len(runs) > _MAX_RUNS_SHOWN:
+        runs[_MAX_RUNS_SHOWN:] = ["..."]
+    where = f"item{'s' if len(items) > 1 else ''} {', '.join(runs)}: " if items else ""
     return f"{where}{message_of(group)} [{group[0].rule}]"
 
 
@@ -148,15 +153,3 @@ def message_of(group: Sequence[Finding]) -> str:
     """Return the message of the first of `group`, and how many more there are."""
     more = f" (and {len(group) - 1} more like it)" if len(group) > 1 else ""
     return group[0].message + more
-
-
-def items_of(group: Sequence[Finding]) -> str:
-    """Return the items' numbers, runs as `4-9`; nothing where it is about no item."""
-    numbers = sorted({finding.item for finding in group if finding.item is not None})
-    shown = []
-    for _, run in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
-        first, *rest = (number for _, number in run)
-        shown.append(f"{first}-{rest[-1]}" if rest else str(first))
-    if len(shown) > _MAX_RUNS_SHOWN:
-        shown[_MAX_RUNS_SHOWN:] = ["..."]
-    return ", ".join(shown)
