@@ -8,7 +8,6 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 import pytest
-from certificate import kkt_residual
 from scipy.linalg import block_diag
 
 from faao_mav.arrays import Real
@@ -18,7 +17,7 @@ from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.interior.newton import Chain
 from faao_mav.optimizer.interior.rewards import Goal, Queue, Rewards, Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
-from faao_mav.optimizer.scaled import FlightVariables, flight_variables
+from faao_mav.optimizer.scaled import FlightVariables, flight_variables, minimize
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.power import FixedWing, RotaryWing
 from faao_mav.radio.relay import RelayQueue
@@ -130,6 +129,23 @@ SCENARIOS: dict[str, tuple[Kinematics, Stage]] = {
 }
 
 
+def still_gained(kin: Kinematics, stage: Stage, flight: Trajectory) -> float:
+    """Return what the best feasible flight within a metre of this one gains to first order.
+
+    A convex program of Clarabel's has it from the flight alone, without the multipliers of the
+    method that made it: it is zero exactly where the conditions of Karush, Kuhn and Tucker hold.
+    """
+    rewards = stage(flight.w.T)
+    total, unit = rewards.value.mean(axis=1), float(np.abs(rewards.gradient).max())
+    near, gain = flight_variables(kin), cp.Variable()
+    shift = LENGTH * near.w - flight.w
+    limits = [*near.constraints, cp.abs(shift) <= 1]
+    for each, slope in zip(total, np.moveaxis(rewards.gradient, 1, 0), strict=True):
+        grown = cp.sum(cp.multiply(slope.T / unit, shift)) / kin.slots
+        limits.append(gain <= (each - total.min()) / unit + grown)
+    return max(0.0, -float(minimize(-gain, limits).value)) * unit
+
+
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_optimum_is_feasible_better_and_stationary(name: str) -> None:
     kin, stage = SCENARIOS[name]
@@ -141,8 +157,7 @@ def test_the_optimum_is_feasible_better_and_stationary(name: str) -> None:
     assert best.iterations <= 60
     assert best.value == reward(stage, best.trajectory)
     assert best.value > reward(stage, start)
-    # no flight within a metre of it gains more than this share of its reward
-    assert kkt_residual(kin, stage, best.trajectory) < 1e-5 * best.value
+    assert still_gained(kin, stage, best.trajectory) < 1e-5 * best.value
 
 
 @pytest.mark.parametrize("room", [0, 1e-3])
