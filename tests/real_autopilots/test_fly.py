@@ -1,6 +1,6 @@
-"""Real autopilots fly a short plan: armed, started and watched by `fly`, then debriefed.
+"""Real autopilots fly a short fenced plan: armed, started and watched by `fly`, then debriefed.
 
-Where they have landed, near home, they fly it again, by setpoints.
+Where they have landed, near home, they fly it again, by setpoints. Their own fence is on.
 """
 
 import json
@@ -13,6 +13,8 @@ from simulators import simulated, start_log
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
+from faao_mav.fly.logs import read_log
+from faao_mav.plan import read_plan
 
 SHORT = {
     "flight.duration": 25,
@@ -25,7 +27,14 @@ SHORT = {
     "radio.relay.power_dbm": 0,
     "radio.fading_samples": 8,
     "mission.on_finish": "land",
+    "fence.margin": 2,
+    "fence.inclusion": [[-40, -30], [60, -30], [60, 70], [-40, 70]],
+    "fence.exclusion": [
+        {"polygon": [[-20, 12], [5, 12], [5, 18], [-20, 18]]},
+        {"center": [16, 16], "radius": 4},
+    ],
 }
+"""With a wall between home and the start, and a round zone beside the way."""
 
 
 def run(*arguments: object) -> list[dict[str, Any]]:
@@ -45,10 +54,13 @@ def options_for(kind: str, autopilots: Path, parameters: Path, where: Path) -> t
         return ("--speedup", "10", "--keep", str(where), *tuned)
     own, lines = where / "own.parm", parameters.read_text().splitlines()
     values = [line.replace(",", " ") for line in lines if not line.startswith("#")]
-    own.write_text("\n".join(["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 1", *values]))
+    own.write_text("\n".join(["LOG_BACKEND_TYPE 1", "GUID_TIMEOUT 1", *FENCE_ON, *values]))
     defaults = f"{autopilots / 'ardupilot' / 'copter.parm'},{own}"
     return ("--speedup", "5", "--defaults", defaults)
 
+
+FENCE_ON = ("FENCE_ENABLE 1", "FENCE_TYPE 4")
+"""ArduCopter: areas of the fence count."""
 
 RATES = ("rate_bs_uav", "rate_uav_user", "delivered_rate")
 
@@ -77,6 +89,10 @@ def test_a_plan_is_flown_watched_and_debriefed(kind: str, autopilots: Path, tmp_
     # a delay of the link counts as many times as the simulator is fast: setpoints then lag behind
     assert end["flight"]["flown"]["rms_position_error"] < 3
     assert end["flight"]["altitude_error"] < 1.5
+    area, (record,) = read_plan(plan).keep_in, read_log(heard)
+    assert area is not None
+    places = read_plan(plan).origin.frame.to_local(record.latitude, record.longitude)
+    assert area.clearance(places) > 0.5
     (own,) = tmp_path.rglob("*.ulg" if kind == "px4" else "*.BIN")
     for log in (heard, own):
         (told,) = run("debrief", log, "--solution", save, "--json")

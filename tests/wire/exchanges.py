@@ -5,7 +5,7 @@ are held to them. Each exchange begins with its name after `#`; a line `> ...` i
 station sends, `~ SECONDS` is silence of it, and the lines `< ...` after it are the answers.
 
     count mission 2              MISSION_COUNT
-    item mission 0 way           MISSION_ITEM_INT: one of `ROWS`
+    item mission 0 way           MISSION_ITEM_INT: one of `items.tsv`
     request mission 0            MISSION_REQUEST_INT
     list mission, clear mission  MISSION_REQUEST_LIST, MISSION_CLEAR_ALL
     ack mission ACCEPTED         MISSION_ACK
@@ -20,11 +20,10 @@ bar stands `from` or `to` whom else, by system and component.
 into the file. Each line waits for as many answers as the file has: what is new needs two runs.
 """
 
-import math
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import takewhile
 from pathlib import Path
 
@@ -51,40 +50,16 @@ PATIENCE = 2.0
 """Seconds that an answer may take on a busy machine."""
 
 
-def _row(command: int, frame: int, *params: float, z: float = 20.5, step: int = 0) -> WireItem:
-    four = (*params, *[0.0] * (4 - len(params)))
-    place = (-353_600_000 + step * 10_000, 1_491_600_000 + step * step * 10_000)
-    return WireItem(command, frame, (four[0], four[1], four[2], four[3]), *place, z)
+def _items() -> Iterator[tuple[str, WireItem]]:
+    """Yield the items that are sent, by their names in `items.tsv`."""
+    for line in (EXCHANGES / "items.tsv").read_text().splitlines()[1:]:
+        name, command, frame, *params, x, y, z = line.split("\t")
+        one, two, three, four = map(float, params)
+        place = int(x), int(y), float(z)
+        yield name, WireItem(int(command), int(frame), (one, two, three, four), *place)
 
 
-ROWS = {
-    "home": _row(16, 0, z=0.0),
-    "way": _row(16, 3),
-    "other": _row(16, 3, step=1),
-    "unknown": _row(4242, 3),
-    "none": _row(1, 3),
-    "spline": _row(82, 3),
-    "terrain": _row(16, 10),
-    "unset": _row(16, 3, 0.0, math.nan),
-    "beyond": WireItem(16, 3, (0.0, 0.0, 0.0, 0.0), 910_000_000, 0, 9.0),
-    "frame1": _row(16, 1),
-    "vertex0": _row(5001, 0, 3.4, 2.5, 3.5, 4.5, z=7.5),
-    "vertex1": _row(5001, 3, 3.0, z=0.0, step=1),
-    "vertex2": _row(5001, 6, 3.0, z=0.0, step=2),
-    "thin": _row(5001, 0, 2.0, z=0.0),
-    "circle": _row(5004, 3, 40.7, 2.5, 3.5, 4.5, z=7.5),
-    "circle1": _row(5004, 1, 40.0),
-    "circle2": _row(5004, 2, 40.0),
-    "circle10": _row(5004, 10, 40.0),
-    "flat": _row(5003, 0, 0.0),
-    "return": _row(5000, 3, 1.5, 2.5, 3.5, 4.5, z=7.5),
-    "rally": _row(5100, 3, 1.5, 2.5, 3.5, 4.5, z=12.9),
-    "rally0": _row(5100, 5, z=-5.6),
-    "rally10": _row(5100, 10),
-    "rally1": _row(5100, 1),
-    "high": _row(5100, 3, z=40_000.0),
-}
-"""The items that are sent, by name."""
+ITEMS = dict(_items())
 
 
 def exchanges(text: str) -> dict[str, list[str]]:
@@ -147,7 +122,7 @@ def parsed(text: str, to: Address) -> Message:
         case ["count", part, number]:
             return messages.MissionCount(to, _type(part), int(number))
         case ["item", part, number, row]:
-            return messages.MissionItemInt(to, _type(part), int(number), ROWS[row])
+            return messages.MissionItemInt(to, _type(part), int(number), ITEMS[row])
         case ["request", part, number]:
             return messages.MissionRequestInt(to, _type(part), int(number))
         case ["list", part]:

@@ -47,6 +47,7 @@ def simulate(
     heard: Callable[[Envelope, float], object] | None = None,
     lost: tuple[int, int] | None = None,
     tapes: Sequence[list[bytes]] | None = None,
+    passed: Counter[tuple[int, int, int]] | None = None,
 ) -> float:
     """Run until `client` has an outcome, or `until`, and return the time that it took, s.
 
@@ -54,7 +55,8 @@ def simulate(
     and direction. Packets are real ones: what is corrupted is rejected by its checksum, or is
     not. `events` are called at their times, with them; `heard` is told what the client receives.
     Of the message with the first number in `lost` each channel loses one, counted from 1. What the
-    client and the server receive is appended to their `tapes`.
+    client and the server receive is appended to their `tapes`. Packets are counted in `passed` by
+    their sender, their receiver (0 is the client, 1 the server) and the number of the message.
     """
     faults = faults or Faults()
     nodes = [_Node(station, Codec(station.address)) for station in (client, server, *others)]
@@ -62,7 +64,7 @@ def simulate(
     channels = {pair: Channel(faults, "{} to {}".format(*pair)) for pair in pairs}
     order = count()
     queue: list[tuple[float, int, int, bytes]] = []
-    passed = Counter[tuple[int, int, int]]()
+    passed = Counter() if passed is None else passed
     planned = sorted(events, key=lambda event: event[0])
 
     def send(sender: int, messages: Sequence[Message], now: float) -> None:

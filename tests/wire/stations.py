@@ -152,30 +152,3 @@ class Air:
 
     def close(self) -> None:
         pass
-
-
-@dataclass
-class Counted:
-    """A machine, and what it sends."""
-
-    machine: Any
-    sent: list[Message] = field(default_factory=list)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.machine, name)
-
-    def start(self, now: float) -> Sequence[Message]:
-        return self._note(self.machine.start(now))
-
-    def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
-        return self._note(self.machine.on(envelope, now))
-
-    def tick(self, now: float) -> Sequence[Message]:
-        return self._note(self.machine.tick(now))
-
-    def hang_up(self, now: float) -> Sequence[Message]:
-        return self._note(self.machine.hang_up(now))
-
-    def _note(self, messages: Sequence[Message]) -> Sequence[Message]:
-        self.sent += messages
-        return messages

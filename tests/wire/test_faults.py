@@ -1,11 +1,12 @@
 """Whatever link or vehicle do: an upload is verified and right, or told as failed, and ends."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from exchanges import EXCHANGES, ROWS, at_desk, exchanges, played
+from exchanges import EXCHANGES, ITEMS, at_desk, exchanges, played
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulate import Station, simulate
@@ -16,7 +17,6 @@ from stations import (
     KINDS,
     RALLY,
     VEHICLE,
-    Counted,
     Desk,
     a_mission,
     mock_of,
@@ -130,16 +130,13 @@ def test_a_quick_link_is_quick_and_a_slow_one_is_not_flooded(
     mock, peer = MockAutopilot(behaviour_of(kind), home=HOME, rate=telemetry), peer_of(kind)
     mock.tick(0.0)
     for talk, most in ((send_list(rows_for(kind, 100)[:100], peer), up), (read_list(peer), back)):
-        client, server = Counted(Script(talk)), Counted(mock)
-        stations = Station(client, GROUND_STATION), Station(server, VEHICLE)
-        seconds -= simulate(*stations, faults, until=2000.0)
+        client, passed = Script(talk), Counter[tuple[int, int, int]]()
+        stations = Station(client, GROUND_STATION), Station(mock, VEHICLE)
+        seconds -= simulate(*stations, faults, until=2000.0, passed=passed)
+        assert client.outcome is not None
         assert client.outcome.verdict in ("accepted", "unknown")
-        sent = sum(
-            isinstance(each, messages.MissionItemInt | messages.MissionRequestInt)
-            for each in client.sent
-        )
-        asked = sum(isinstance(each, messages.MissionRequestInt) for each in server.sent)
-        assert sent <= most * max(asked, 100)
+        asked = passed[1, 0, REQUEST] + passed[1, 0, REQUEST_INT]
+        assert passed[0, 1, ITEM_INT] + passed[0, 1, REQUEST_INT] <= most * max(asked, 100)
     assert seconds > 0
 
 
@@ -252,7 +249,7 @@ def test_what_a_channel_does() -> None:
 # ---- what it says by hand
 
 BY_HAND = exchanges((EXCHANGES / "client.txt").read_text())
-SENT = [ROWS[name] for name in ("way", "other", *["way"] * 7)]
+SENT = [ITEMS[name] for name in ("way", "other", *["way"] * 7)]
 
 
 def client(job: str, firmware: str, count: str = "0") -> Desk:

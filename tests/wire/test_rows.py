@@ -6,8 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from exchanges import EXCHANGES
+from hypothesis import given as drawn
+from hypothesis import settings
 from hypothesis import strategies as st
+from judged import given
 from pymavlink.dialects.v20 import common
 from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, rows_for, vehicle_of
 
@@ -93,7 +96,7 @@ items = st.builds(
 
 
 @settings(max_examples=15)
-@given(st.lists(items, min_size=1, max_size=5), st.sampled_from(["ardupilot", "px4"]))
+@drawn(st.lists(items, min_size=1, max_size=5), st.sampled_from(["ardupilot", "px4"]))
 def test_rows_hold_all_of_an_item_of_a_fence_and_of_a_rally_point(
     items: Any, firmware: str
 ) -> None:
@@ -126,54 +129,21 @@ def changed(rows: Sequence[WireItem], index: int, **changes: Any) -> tuple[WireI
     return (*rows[:index], replace(rows[index], **changes), *rows[index + 1 :])
 
 
-PLACE = (-35.0, 149.0, 20.0)
-WAYPOINT = MissionItem(16, 3, (2.7, 5.0, 1.5, 30.0), *PLACE)
-PLAIN = MissionItem(16, 3, (2.0, 0.0, 0.0, 0.0), *PLACE)
-SPEED = MissionItem(178, 2, (1.0, 5.0, -1.0, 0.0))
-GRIPPER = MissionItem(183, 2, (9.0, 1500.0, 2.0, 0.0))
-UNSET = MissionItem(16, 3, (math.nan,) * 4, *PLACE)
-FINE = MissionItem(16, 3, (0.1, 0.0, 0.0, 0.3), *PLACE[:2], 1234.567)
-READ_BACK: tuple[tuple[str, MissionItem, dict[str, Any], str], ...] = (
-    # What storage loses is told, and no error.
-    ("ardupilot", WAYPOINT, {"params": (2.0, 0.0, 0.0, 0.0)}, "d d d d"),
-    ("px4", WAYPOINT, {"params": (2.7, 5.0, 0.0, 30.0)}, "d"),
-    ("generic", WAYPOINT, {"params": (2.0, 5.0, 1.5, 30.0)}, "w"),
-    # Anything else is wrong.
-    ("ardupilot px4", WAYPOINT, {"params": (3.0, 5.0, 1.5, 30.0)}, "w"),
-    ("ardupilot px4", PLAIN, {"x": -350_000_005}, "w"),
-    ("ardupilot px4", PLAIN, {"z": 20.05}, "w"),
-    ("ardupilot px4", PLAIN, {"frame": 0}, "w"),
-    # The same in other words.
-    ("ardupilot px4", PLAIN, {"z": 20.009}, ""),
-    ("ardupilot px4", PLAIN, {"frame": 6}, ""),
-    ("ardupilot px4", PLAIN, {"current": 1}, ""),
-    ("px4", FINE, {"params": (0.10000000149011612, 0.0, 0.0, 0.30000001192092896)}, ""),
-    # A command without a place comes back from ArduPilot in frame 0.
-    ("ardupilot", SPEED, {"frame": 0}, ""),
-    ("px4", SPEED, {"frame": 0}, "w"),
-    # Not set may read back as nothing.
-    ("px4", UNSET, {"params": (0.0,) * 4}, ""),
-    ("px4", UNSET, {"params": (0.0, 0.0, 0.0, 1.0)}, "w"),
-    # Of commands that are not known numbers may be lost, but not replaced.
-    ("ardupilot", GRIPPER, {"frame": 0, "params": (9.0, 1500.0, 0.0, 0.0)}, "d"),
-    ("ardupilot", GRIPPER, {"frame": 0, "params": (9.0, 1600.0, 2.0, 0.0)}, "w"),
-)
-"""Vehicles, an item, how it comes back, and whether each difference is dropped or wrong."""
-
-
 def test_what_is_read_back_otherwise() -> None:
-    for firmwares, item, change, expected in READ_BACK:
+    table = (EXCHANGES / "read_back.tsv").read_text().splitlines()
+    for line in (each for each in table if not each.startswith("#")):
+        firmwares, *words, expected = line.split("\t")
         for firmware in firmwares.split():
-            sent = wire_items(Mission((item,), HOME), MISSION, vehicle_of(firmware))
-            found = [
-                kind[0] for kind in kinds(sent, changed(sent, -1, **change), firmware).values()
-            ]
-            assert "w" in found if expected == "w" else found == expected.split(), (item, change)
+            missions = (Mission(given(each).mission.items, HOME) for each in words)
+            sent, back = (wire_items(each, MISSION, vehicle_of(firmware)) for each in missions)
+            found = [kind[0] for kind in kinds(sent, back, firmware).values()]
+            assert "w" in found if expected == "w" else found == expected.split(), line
     sent = rows_for("ardupilot", 5)
     for rows in (sent[:-1], (*sent, sent[-1]), ()):
         (difference,) = compare(sent, rows, MISSION, vehicle_of("ardupilot"))
         assert (difference.field, difference.kind, difference.sent) == ("count", "wrong", 5)
         assert difference.found == max(len(rows) - 1, 0)
+    assert kinds(sent, changed(sent, -1, current=1), "ardupilot") == {}
     # ArduPilot's own home is told.
     moved = changed(sent, 0, x=-353_700_000)
     assert kinds(sent, moved, "ardupilot") == {(None, "home"): "dropped"}
