@@ -19,7 +19,6 @@ from stations import (
     HOME,
     RALLY,
     VEHICLE,
-    Counted,
     a_mission,
     peer_of,
     rows_for,
@@ -310,33 +309,47 @@ class Scene:
         return lambda _: mock.lists.replace(part, rows)
 
 
-class Judge(Counted):
+class Judge:
     """A watch whose every message is judged as it is sent: `wrong` is what must not happen.
 
     `setpoints` are when each was sent, s, and to what height above home, m.
     """
 
     def __init__(self, scene: Scene, *, may_start: bool = True) -> None:
-        super().__init__(scene.watch)
+        self.machine: Any = scene.watch
         self.scene, self.may_start = scene, may_start
+        self.sent = list[Message]()
         self.wrong, self.setpoints = list[str](), list[tuple[float, float]]()
         self._told: messages.GlobalPositionInt | None = None
         self._mode: int | None = None
         self._ordered, self._pilots, self._asked_at = False, False, 0.0
 
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.machine, name)
+
+    def start(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.start(now))
+
     def on(self, envelope: Envelope, now: float) -> Sequence[Message]:
         if envelope.sender == VEHICLE:
             self._hear(envelope.message)
-        return self._judged(super().on(envelope, now), now)
+        return self._judged(self._note(self.machine.on(envelope, now)), now)
 
     def tick(self, now: float) -> Sequence[Message]:
-        sent, watch = self._judged(super().tick(now), now), self.machine
+        sent, watch = self._judged(self._note(self.machine.tick(now)), now), self.machine
         unsure = watch.streams and watch._unsure_since is not None
         if watch.outcome is not None or not watch._is_to_hold or unsure:
             self._asked_at = now
         elif now > self._asked_at + 2.1:
             self.wrong.append(f"{now:.1f} s: the hold is not asked for any more")
         return sent
+
+    def hang_up(self, now: float) -> Sequence[Message]:
+        return self._note(self.machine.hang_up(now))
+
+    def _note(self, messages: Sequence[Message]) -> Sequence[Message]:
+        self.sent += messages
+        return messages
 
     def interrupt(self, now: float) -> None:
         """Press Ctrl-C; what is sent then is lost at first."""
