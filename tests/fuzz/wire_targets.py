@@ -1,4 +1,4 @@
-"""Both ends of a link, as fuzzers see them: a client, mock autopilots, and who holds a key.
+"""Both ends of a link, as fuzzers see them: a client and mock autopilots.
 
 What one end hears is a tape: its datagrams one after the other, before each its length in two
 bytes, big-endian.
@@ -25,20 +25,16 @@ from faao_mav.mission.formats import render_files
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages
-from faao_mav.wire.codec import Codec, Framer, message_id
+from faao_mav.wire.codec import Codec, message_id
 from faao_mav.wire.discover import FoundVehicle, choose, discover
 from faao_mav.wire.jobs import UploadReport, explain, read_held, upload_parts
 from faao_mav.wire.machine import Machine, Script, Talk, ask_alive, ask_for
 from faao_mav.wire.protocol import GROUND_STATION, HOME_POSITION, MavCommand, MissionType
-from faao_mav.wire.signing import Signing
 from faao_mav.wire.transfer import Peer
 from faao_mav.wire.wire_items import mission_of, wire_items
 
 _HEADER = 10
 """Bytes of a MAVLink 2 packet before its payload."""
-
-_SIGNED = 1
-"""The flag of a packet with a signature, which is not written anew: only the key could."""
 
 _NUMBERS = (math.nan, math.inf, -math.inf, 3e38, -1.0, 1e-30, 3.0, 65_536.0, 2.0**31, 90.5)
 _ODD = (
@@ -110,7 +106,7 @@ def _odd(packet: bytes, random: Random) -> bytes:
 
 def _lied(packet: bytes, random: Random) -> bytes:
     kind = common.mavlink_map.get(message_id(packet) if len(packet) > _HEADER else None)
-    if kind is None or packet[0] != 0xFD or packet[2] & _SIGNED:
+    if kind is None or packet[0] != 0xFD:
         return packet
     content = bytearray(packet[_HEADER : _HEADER + packet[1]].ljust(kind.unpacker.size, b"\0"))
     for _ in range(random.choice((1, 1, 3))):
@@ -154,8 +150,6 @@ def wire_targets() -> dict[str, Target]:
             return _serve(kind, content)
 
         found.append(Target(f"mock_{kind}", serve, [tape], mutated))
-    genuine = packed(Codec(VEHICLE, _signing()), map(_said, range(20)))
-    found.append(Target("signed", lambda tape: _take(tape, genuine), [tape_of(genuine)], mutated))
     return {target.name: target for target in found}
 
 
@@ -240,22 +234,3 @@ def _serve(kind: MockKind, tape: bytes) -> object:
         tell(mock, vehicle, b"", 0.01 * len(heard) + later)
     assert math.isfinite(mock.deadline)
     return mock.lists
-
-
-def _signing() -> Signing:
-    """Return a key, at a time that stands still: a tape stays what it was."""
-    return Signing(bytes(range(32)), clock=lambda: 1_800_000_000.0)
-
-
-def _said(number: int) -> messages.Message:
-    heartbeat = messages.Heartbeat(2, 12, 0, 0, 3)
-    return heartbeat if number % 3 else messages.Statustext(6, f"number {number}")
-
-
-def _take(tape: bytes, genuine: Sequence[bytes]) -> object:
-    """Take what is on `tape` as who holds the key does: each packet of `genuine` once, no other."""
-    codec, framer = Codec(GROUND_STATION, _signing()), Framer()
-    packets = [packet for each in datagrams(tape) for packet in framer.feed_datagram(each)]
-    order = [genuine.index(found.raw) for packet in packets for found in codec.parse(packet)]
-    assert order == sorted(set(order)), order
-    return order

@@ -17,20 +17,7 @@ from faao_mav.mission.formats.fence_file import geojson_fence, kml_fence, read_f
 DATA = Path(__file__).parent.parent / "data"
 SQUARE = [[8.0, 47.0], [8.1, 47.0], [8.1, 47.1], [8.0, 47.0]]
 HOLE = [[8.05, 47.01], [8.06, 47.01], [8.06, 47.02], [8.05, 47.01]]
-KML = """<?xml version="1.0" encoding="UTF-8"?>
-<kml xmlns="http://www.opengis.net/kml/2.2"><Document><name>fence.kml</name>
-<Placemark><name>field</name><gx:balloonVisibility>1</gx:balloonVisibility><Polygon>
-<outerBoundaryIs><LinearRing><coordinates>8,47,0 8.1,47,0 8.1,47.1,0 8,47,0</coordinates></LinearRing>
-</outerBoundaryIs><innerBoundaryIs><LinearRing><coordinates>
-8.05,47.01 8.06,47.01 8.06,47.02 8.05,47.01</coordinates></LinearRing></innerBoundaryIs></Polygon>
-</Placemark><Folder><name>No-fly zones</name><Placemark><name>school</name><MultiGeometry><Polygon>
-<outerBoundaryIs><LinearRing><coordinates>8,47 8.1,47 8.1,47.1</coordinates></LinearRing>
-</outerBoundaryIs></Polygon></MultiGeometry></Placemark></Folder>
-<Placemark><ExtendedData><SchemaData><SimpleData name="kind">NFZ</SimpleData></SchemaData>
-</ExtendedData><Polygon><outerBoundaryIs><LinearRing><coordinates>8,47 8.1,47 8.1,47.1</coordinates>
-</LinearRing></outerBoundaryIs></Polygon></Placemark>
-<Placemark><name>mast</name><Point><coordinates>8,47</coordinates></Point></Placemark>
-</Document></kml>"""  # noqa: E501
+KML = (DATA / "fences" / "holes.kml").read_text()
 
 
 def geojson(value: Any) -> Fence:
