@@ -16,6 +16,7 @@ from faao_mav.errors import InputError
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import SATURATED, price, saturation
 from faao_mav.optimizer.solution import Solution, load_solution, save_solution
+from faao_mav.workflow import Result
 
 FEW = {"radio.fading": "realization", "optimizer.starts": ["straight"]}
 
@@ -142,6 +143,11 @@ def test_mutual_information_is_above_the_cutoff_rate(solution: Solution) -> None
     assert rates.R_G < information.uav_user < 2
     assert information.average == min(information.bs_uav, information.uav_user)
     assert price(solution) == information
+    told = Result(solution, information=information).as_dict()
+    names = ("average", "bs_uav", "uav_user", "delivered", "error")
+    keys = ("mutual_information", *(f"mutual_information_{name}" for name in names[1:]))
+    assert [told[key] for key in keys] == [getattr(information, name) for name in names]
+    assert information.bs_uav != information.uav_user
 
 
 def test_mutual_information_of_many_slots_is_that_of_few(small_plan: MakePlan) -> None:

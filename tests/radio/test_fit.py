@@ -169,7 +169,11 @@ def test_the_map_tells_a_field_between_the_legs() -> None:
     x, y = np.meshgrid(np.linspace(-280, 280, 30), np.arange(-180.0, 180.0, 40.0))
     law = fit.gain_db(np.stack([x, y, np.full_like(x, 60.0)], axis=-1))
     true = -45.0 - 10 * np.log10(x**2 + y**2 + 60.0**2)
-    assert apart(shadow, found.at(60.0).value(x, y) + law - true, x, y) < 0.5 * 4.0
+    told = found.at(60.0).value(x, y)
+    assert apart(shadow, told + law - true, x, y) < 0.5 * 4.0
+    assert np.mean(told * (shadow.value(x, y) + true - law)) / np.mean(told**2) == pytest.approx(
+        1, abs=0.1
+    )
     far = found.at(60.0).value(np.array([2000.0]), np.array([0.0]))
     assert far == pytest.approx(0, abs=1e-9)
     assert (found.origin, found.above_law) == ((47.0, 8.0), True)

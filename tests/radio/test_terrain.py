@@ -107,6 +107,21 @@ def test_a_ridge_hides_what_is_behind_it(tmp_path: Path) -> None:
     assert found.ground[16, at[400]] == pytest.approx(100, abs=6)
 
 
+def test_a_path_loses_as_much_from_either_end(tmp_path: Path) -> None:
+    """Over a ridge in the middle: with the mast as high as the aircraft was, and the other way."""
+    raster, _ = read_terrain(
+        tile(tmp_path, lambda x, _: 500 + 100 * np.exp(-(((x - 400) / 150) ** 2)))
+    )
+    there, back = (
+        terrain_map([raster], (*STATION[:2], mast), 2.4e9, (height,), 0.0, 800.0, 50.0).db[
+            0, 16, -1
+        ]
+        for mast, height in ((10.0, 60.0), (60.0, 10.0))
+    )
+    assert there < -20
+    assert back == pytest.approx(there, abs=0.2)
+
+
 def test_clutter_stands_on_the_ground_but_at_the_station(tmp_path: Path) -> None:
     """Its tops are the horizon of whoever stands below them."""
     raster, _ = read_terrain(tile(tmp_path, lambda *_: 500.0))

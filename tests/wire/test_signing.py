@@ -57,6 +57,9 @@ def test_signed_packets_need_the_key() -> None:
         codec = Codec(GROUND_STATION, signing(key))
         taken = [each.envelope and each.envelope.message for each in codec.parse(sent)]
         assert (taken, codec.heard) == ([TEXT] * (verdict == "signed"), {verdict})
+    for k in range(len(packet)):
+        damaged = packet[:k] + bytes([packet[k] ^ 1]) + packet[k + 1 :]
+        assert not [x for x in Codec(GROUND_STATION, signing()).parse(damaged) if x.envelope], k
 
 
 @settings(max_examples=20)
