@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,16 @@ import pytest
 from hypothesis import given as drawn
 from hypothesis import settings
 from hypothesis import strategies as st
-from judged import COPTER, FRAME, HOME, PLANE, at, do, given
+from judged import COPTER, FRAME, HOME, VEHICLES, at, do, given
+from random_missions import missions
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InputError
-from faao_mav.mission import Command, Frame, Home, Mission, MissionItem
+from faao_mav.mission import Command, Frame, Mission, MissionItem
 from faao_mav.mission.item import JUMPS
+from faao_mav.validate import Limits, ValidationContext, validate
 
 PREDICTED = Path(__file__).parents[1] / "data" / "predicted.txt"
 
@@ -150,19 +153,30 @@ def any_items(draw: st.DrawFn) -> MissionItem:
     return do(draw(st.sampled_from([*Command, 183, 206])), *params)
 
 
-@settings(max_examples=30)
-@drawn(
-    st.lists(any_items(), max_size=8),
-    st.sampled_from([None, HOME]),
-    st.sampled_from([COPTER, COPTER, PLANE]),
+STRICT = dict.fromkeys(("WPNAV_SPEED", "WPNAV_ACCEL", "MPC_ACC_HOR", "NAV_ACC_RAD"), 0.0) | {
+    "ARMING_MIS_ITEMS": 127.0,
+    "FENCE_ENABLE": 1.0,
+    "FENCE_TYPE": 15.0,
+    "MIS_TKO_LAND_REQ": 3.0,
+    "GF_MAX_HOR_DIST": 10.0,
+    "GF_MAX_VER_DIST": 10.0,
+}
+near = st.builds(
+    Mission, st.lists(any_items(), max_size=8).map(tuple), st.sampled_from([None, HOME])
 )
-def test_any_mission_is_predicted_or_refused(
-    items: list[MissionItem], home: Home | None, vehicle: Vehicle
+
+
+@settings(max_examples=60)
+@drawn(near | missions(sound=False), st.sampled_from(VEHICLES), st.booleans())
+def test_any_mission_is_predicted_or_refused_and_judged(
+    mission: Mission, vehicle: Vehicle, bare: bool
 ) -> None:
-    mission = Mission(tuple(items), home)
+    vehicle, track = vehicle if bare else replace(vehicle, parameters=STRICT), None
     try:
-        track = predict(mission, vehicle, FRAME, step=0.5)
+        track = predict(mission, vehicle.usable(), FRAME, step=0.5)
+        check(mission, track, step=0.5)
     except InputError as refused:
         assert str(refused)
-        return
-    check(mission, track, step=0.5)
+    limits = Limits() if bare else Limits(1.0, 50.0, 20.0, 5.0, 2.0)
+    for finding in validate(ValidationContext(mission, vehicle, track, limits)):
+        assert finding.item is None or 1 <= finding.item <= len(mission.items)

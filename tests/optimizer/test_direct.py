@@ -73,15 +73,6 @@ def test_a_solution_proves_itself(
     assert max(loaded.residuals().values()) < 1e-6
 
 
-def test_it_is_never_below_algorithm_1(faint_plan: MakePlan) -> None:
-    free = {"flight.start_velocity": "free", "flight.bound_first_acceleration": False}
-    coarse = KNOWN | {"flight.time_step": 1} | free
-    ours = optimize(faint_plan(coarse))
-    few = {"optimizer.method": "algorithm1", "optimizer.max_iterations": 3}
-    paper = optimize(faint_plan(coarse | few))
-    assert ours.rates.R_avg >= paper.rates.R_avg - 1e-4
-
-
 @pytest.mark.figures
 def test_floor_and_ceiling_on_a_small_scenario(faint_plan: MakePlan) -> None:
     """0.64235 is what all of many random flights lead to: much more would be a mistake.

@@ -7,7 +7,6 @@ import pytest
 from closed_forms import bpsk_two_antennas_rate, channel, log_sum, power_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import minimize
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
@@ -92,20 +91,6 @@ def test_never_below_the_classical_schemes(
     others = [scheme(H, W, 1.0) for scheme in SCHEMES.values()]
     for P in [*others, np.eye(shape[1]) * np.sqrt(W / shape[1])]:
         assert np.all(rate >= cutoff_rate(H, P, classes, 1.0) - 1e-6)
-
-
-@pytest.mark.parametrize(("modulation", "W", "seed"), [("qpsk", 12.0, 3), ("8psk", 8.0, 4)])
-def test_as_good_as_many_random_starts(modulation: str, W: float, seed: int) -> None:
-    """Beside the least log-sum of 10 searches by a general optimiser from random points."""
-    H = channel(seed, 2, 2)
-
-    def objective(x: Real) -> float:
-        P = (x[:4] + 1j * x[4:]).reshape(2, 2)
-        return float(log_sum(H, P * np.sqrt(W / power_of(P)), modulation))
-
-    points = np.random.default_rng(seed).standard_normal((10, 8))
-    least = min(float(minimize(objective, x, method="BFGS").fun) for x in points)
-    assert float(log_sum(H, best(H, W, modulation)[0], modulation)) < least + 1e-3
 
 
 def test_extremes() -> None:

@@ -6,7 +6,8 @@ Each mission in `tests/data/verdicts/`, where each vehicle has a file, is upload
 autopilot and, if it is accepted, flown; what became of it is written there. A new one is added by
 hand, as its parameters, its items (how often, command, frame, param1 to param4, x, y, z,
 autocontinue; null is NaN) and perhaps the corners of a fence to stay in. Without names, VEHICLE or
-VEHICLE/NAME, those missions are flown that have no verdict.
+VEHICLE/NAME, those missions are flown that have no verdict. PX4's runner uploads no fence: of its
+missions with one, verdicts stay as they were recorded.
 
 A mission has taken off and come to its end (`flown`), or not:
 `refused` on upload; `rejected` by PX4 after it has acknowledged the upload; `not armed`;
@@ -16,7 +17,6 @@ early`: before the last item.
 """
 
 import csv
-import importlib.util
 import json
 import math
 import os
@@ -82,8 +82,6 @@ def run(folder: Path, vehicle: str, mission: dict[str, Any]) -> dict[str, Any]:
         command += ["--params", given]
         if vehicle == "px4":
             command += ["--instance", str(INSTANCE)]
-            if "fence" in mission:
-                command = [__file__, "--px4-fence", json.dumps(mission["fence"]), *command]
         else:
             command += ["--tail", "15", "--on-ground", "--vehicle", vehicle.removeprefix("ardu")]
             if "fence" in mission:
@@ -184,37 +182,6 @@ def hit_ground(commands: Sequence[int], track: Sequence[tuple[float, int]]) -> b
     return False
 
 
-def with_px4_fence(fence: str, arguments: Sequence[str]) -> int:
-    """Run PX4's runner so that it uploads a fence before each mission."""
-    runner, *rest = arguments
-    spec = importlib.util.spec_from_file_location("fly_px4", runner)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    mission_only = module.Vehicle.upload
-    corners = json.loads(fence)
-
-    def upload(self: Any, items: Any, drop_ack: bool = False) -> Any:
-        self.m.mav.mission_count_send(self.me, 1, len(corners), 1)
-        while True:
-            asked = self.pump(("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"), 3)
-            assert asked is not None, "PX4 does not ask for the fence"
-            if asked.mission_type != 1:
-                continue
-            if asked.get_type() == "MISSION_ACK":
-                assert asked.type == 0, "PX4 refuses the fence"
-                return mission_only(self, items, drop_ack)
-            x, y = (round(1e7 * v) for v in corners[asked.seq])
-            head = (self.me, 1, asked.seq, 0, 5001, 0, 1, len(corners), 0, 0, 0)
-            self.m.mav.mission_item_int_send(*head, x, y, 0, 1)
-
-    module.Vehicle.upload = upload
-    sys.argv = [runner, *rest]
-    status: int = module.main()
-    return status
-
-
 def unpacked(items: Sequence[Row]) -> list[Row]:
     """Return the rows, each as often as the number before it says."""
     return [row for times, *row in items for _ in range(times)]
@@ -236,7 +203,8 @@ def main() -> None:
         missions = json.loads((DATA / f"{vehicle}.json").read_text())
         for name, mission in missions.items():
             asked = {vehicle, f"{vehicle}/{name}"} & chosen
-            if not asked and (chosen or "verdict" in mission):
+            fenced = vehicle == "px4" and "fence" in mission
+            if fenced or (not asked and (chosen or "verdict" in mission)):
                 continue
             kept = {key: mission[key] for key in ("parameters", "fence", "items") if key in mission}
             missions[name] = became = kept | run(folder, vehicle, mission)
@@ -245,6 +213,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--px4-fence"]:
-        sys.exit(with_px4_fence(sys.argv[2], sys.argv[3:]))
     main()
