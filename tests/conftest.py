@@ -90,6 +90,14 @@ def edited(text: str, changes: dict[str, Any]) -> str:
     return dump_yaml(data)
 
 
+def changes_in(path: Path) -> dict[str, dict[str, Any]]:
+    """Return the changes of plans in a YAML file by name, over those of which each is `like`."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, changes in load_yaml(path.read_text(), path.name).items():
+        found[name] = found.get(changes.pop("like", ""), {}) | changes
+    return found
+
+
 def contents(plan: Plan) -> dict[str, Any]:
     """Return what `plan` holds by section, without its text and the name of its file."""
     return {each.name: getattr(plan, each.name) for each in fields(PlanContents)}

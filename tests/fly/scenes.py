@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, cast
 
 import numpy as np
-from conftest import FLYABLE, edited
+from conftest import FLYABLE, changes_in, edited
 from simulate import Station, simulate
 from stations import (
     FOREIGN,
@@ -35,7 +35,6 @@ from faao_mav.geodesy import LocalFrame
 from faao_mav.mission import Home, Mission, MissionItem
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.solution import Solution
-from faao_mav.plan.yaml_text import load_yaml
 from faao_mav.sim import MockAutopilot, MockKind, behaviour_of
 from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages, protocol
@@ -59,11 +58,8 @@ LOITER = 5
 CAP = NEAR + 8**2 / (2 * 1.6)
 """The farthest, m, that the gate lets the swift flight be sent."""
 
-PLANS: dict[str, dict[str, Any]] = {}
+PLANS = changes_in(DATA / "plans.yaml")
 """Flights by setpoints, as changes of the small plan."""
-
-for _name, _changes in load_yaml((DATA / "plans.yaml").read_text(), "plans.yaml").items():
-    PLANS[_name] = PLANS.get(_changes.pop("like", ""), {}) | _changes
 
 FAR = MissionItem(16, 3, x=HOME.latitude + 0.01, y=HOME.longitude, z=30.0)
 MISSIONS = {

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MISSIONS, MakePlan
+from conftest import MISSIONS, MakePlan, changes_in
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_flights import random_flight, with_maps
@@ -26,45 +26,8 @@ from faao_mav.optimizer.search.map_bound import MapBound, map_bound
 from faao_mav.optimizer.search.sweep import Cells, cells_of, largest_near
 from faao_mav.plan import Plan, read_plan
 
-WALL = {
-    "fence.margin": 3,
-    "fence.exclusion": [{"polygon": [[13, 12], [42, 12], [42, 56], [13, 56]]}],
-}
-FREE = {
-    "flight.start_velocity": "free",
-    "flight.end_velocity": "free",
-    "flight.bound_first_acceleration": False,
-}
-QUEUE = {"radio.causal": True}
-BY_THE_AXIS: dict[str, dict[str, Any]] = {
-    "R_avg": {},
-    "delivered": QUEUE,
-    "known draws": QUEUE | {"radio.fading": "realization"},
-    "free ends": FREE,
-    "fast": {
-        **FREE,
-        "flight.start": [-60, -60],
-        "flight.end": [120, 110],
-        "vehicle.max_speed": 40,
-        "vehicle.max_acceleration": 3,
-    },
-    "least overhead": {"radio.gain": {"elevation_db": [0, 0, -40]}},
-    "steep": {"radio.gain": {"exponent": 2.4, "elevation_db": [-8, 12]}},
-}
-KINDS: dict[str, dict[str, Any]] = BY_THE_AXIS | {
-    "half duplex": QUEUE | {"radio.duplex": "half"},
-    "unknown fading": {"radio.fading": "ergodic", "radio.fading_samples": 3},
-    "buffer": QUEUE | {"radio.bandwidth_mhz": 1, "radio.relay.buffer_mbytes": 0.2},
-    "fence": QUEUE | WALL,
-    "wind": QUEUE | {
-        "vehicle.max_speed": 8, "site.wind": {"speed": 6, "from": 250}, "flight.duration": 20,
-    },
-    "maps": QUEUE | {"radio.duplex": "half"},
-    "moving": {
-        "radio.causal": True, "radio.duplex": "half",
-        "radio.base_station.velocity": [4, -3], "radio.ground_user.velocity": [-6, 2],
-    },
-}  # fmt: skip
+KINDS = changes_in(MISSIONS.parent / "tests" / "data" / "bounded.yaml")
+BY_THE_AXIS = [*KINDS][: [*KINDS].index("half duplex")]
 FAINT = {
     "radio.fading": "realization",
     "radio.base_station.power_dbm": 0,
@@ -195,7 +158,7 @@ def test_a_step_over_the_map_reaches_every_cell_that_v_max_does(small_plan: Make
 
 @given(seed=st.integers(0, 2**31))
 def test_an_outward_map_misses_no_flight(small_plan: MakePlan, seed: int) -> None:
-    kin = build_problem(small_plan(FREE if seed % 2 else {})).kinematics
+    kin = build_problem(small_plan(KINDS["free ends"] if seed % 2 else {})).kinematics
     sweep = cells_about(kin)
     flight = random_flight(kin, seed)
     t = kin.time_step * np.arange(kin.slots)

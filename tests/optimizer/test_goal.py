@@ -123,18 +123,11 @@ def test_the_least_number_is_that_of_trying_all(
         assert least_number(surplus.__getitem__, 0, high, -1.0, surplus[high]) == least
 
 
-COPTER = parse_plan("""
-site: {origin: {latitude: 47, longitude: 8}}
-vehicle: {max_speed: 14, max_acceleration: 4, power: {}}
-flight: {start: [0, 60], end: [60, 0], altitude: 40, duration: 24, time_step: 1}
-radio:
-  fading: none
-  bandwidth_mhz: 10
-  base_station: {position: [0, 0], power_dbm: 1}
-  relay: {power_dbm: 20, noise_dbm: -80}
-  ground_user: {position: [80, 60], noise_dbm: -80}
-optimizer: {starts: [bs-user], max_iterations: 25}
-""")
+COPTER = BASE.changed({
+    "vehicle": {"max_speed": 14, "max_acceleration": 4, "power": {}},
+    "flight.duration": 24,
+    "optimizer": {"starts": ["bs-user"], "max_iterations": 25},
+})  # fmt: skip
 WING = """{type: plane, min_speed: 9, max_speed: 16, max_acceleration: 5,
            power: {cruise_w: 90, at: 12, mass: 2.5}}"""
 PLANE = COPTER.changed({

@@ -1,6 +1,7 @@
 """Real autopilots fly a short fenced plan: armed, started and watched by `fly`, then debriefed.
 
-Where they have landed, near home, they fly it again, by setpoints. Their own fence is on.
+Where they have landed, near home, they fly it again, by setpoints. Their own fence is on. A plane
+returns as is predicted.
 """
 
 import json
@@ -9,12 +10,14 @@ from typing import Any
 
 import pytest
 from conftest import MISSIONS, edited
+from record import flown_by
 from simulators import simulated, start_log
 from typer.testing import CliRunner
 
 from faao_mav.cli.main import app
 from faao_mav.fly.logs import read_log
-from faao_mav.plan import read_plan
+from faao_mav.plan import parse_plan, read_plan
+from faao_mav.workflow import plan_mission
 
 SHORT = {
     "flight.duration": 25,
@@ -102,3 +105,28 @@ def test_a_plan_is_flown_watched_and_debriefed(kind: str, autopilots: Path, tmp_
         # on a busy machine PX4's own log of so short a flight was once further from what was heard
         apart = 5e-3 if log == own and kind == "px4" else 1e-3
         assert any(found == pytest.approx(each, rel=apart) for each in seen), (log, found, seen)
+
+
+RETURN_HEIGHT = 30.0
+PLANE = {
+    "vehicle.parameters": {"RTL_ALTITUDE": RETURN_HEIGHT},
+    "flight.duration": 90,
+    "optimizer.starts": ["straight"],
+    "optimizer.max_iterations": 5,
+}
+"""Of the sample: what the plane flies before it returns does not matter here."""
+
+
+def test_a_plane_circles_over_home_at_its_own_height(autopilots: Path, tmp_path: Path) -> None:
+    """A minute after the mission: the way home, the climb, a circle."""
+    plan = parse_plan(edited((MISSIONS / "plane_relay.yaml").read_text(), PLANE))
+    result = plan_mission(plan)
+    (mission,) = result.write(tmp_path / "plane.waypoints")
+    options = ["--vehicle", "plane", "--speedup", "25", "--linger", "60"]
+    options += ["--params", f"RTL_ALTITUDE={RETURN_HEIGHT:g}"]
+    track = flown_by(autopilots / "fly_arducopter.py", mission, options)
+    assert result.check is not None
+    assert result.check.track is not None
+    predicted = float(result.check.track.position[-1, 2])
+    assert predicted == pytest.approx(RETURN_HEIGHT, abs=3)
+    assert float(track[-1]["alt_rel_m"]) == pytest.approx(predicted, abs=5)
