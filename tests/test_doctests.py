@@ -13,7 +13,7 @@ ROOMS = sorted(module.name for module in pkgutil.iter_modules(faao_mav.__path__)
 
 
 @pytest.mark.parametrize("room", ROOMS)
-@pytest.mark.usefixtures("planned_once")
+@pytest.mark.usefixtures("planned_once", "coarse_map")
 def test_examples_in_docstrings(room: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(Path(__file__).parents[1])  # examples read missions/
     first = import_module(f"faao_mav.{room}")
