@@ -8,30 +8,18 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from pages import PAGES, ROOT
 
 import faao_mav
 
 PACKAGE = Path(faao_mav.__file__).parent
 
-FLOORS = (
-    ("errors", "arrays"),
-    ("vector", "files", "geodesy", "power", "processes"),
-    ("radio", "mission"),
-    ("autopilot",),
-    ("wire", "plan"),
-    ("sim", "optimizer"),
-    ("schedule",),
-    ("validate",),
-    ("fly",),
-    ("workflow",),
-    ("report",),
-    ("study",),
-    ("app",),
-    ("cli",),
-)
+FLOOR = {
+    room: int(floor)
+    for floor, rooms in re.findall(r"^\| (\d+) \| (`.*?`) \|", PAGES["docs/house.md"], re.MULTILINE)
+    for room in re.findall(r"`(\w+)`", rooms)
+}
 """Rooms from the ground up: none imports from its own floor or one above it, but from itself."""
-
-FLOOR = {room: level for level, rooms in enumerate(FLOORS) for room in rooms}
 
 
 MODULES = {
@@ -97,25 +85,9 @@ def test_every_public_name_can_be_had_and_the_package_is_a_program() -> None:
     assert told == f"faao-mission {faao_mav.__version__}\n"
 
 
-WAITING = (
-    ("cli.main", {"numpy", "cvxpy", "pyproj", "pydantic", "rich.progress"}),
-    ("cli.missions", {"numpy", "pyproj", "pydantic", "rich.table", "shapely"}),
-    ("cli.vehicle", {"numpy", "pymavlink", "pydantic"}),
-    ("cli.study", {"numpy", "joblib", "matplotlib"}),
-    ("cli.serving", {"numpy", "nicegui", "ruamel", "pydantic", "pymavlink"}),
-    ("mission.formats", {"scipy", "cvxpy", "pyproj", "pymavlink", "pydantic"}),
-    ("validate", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
-    ("radio.mutual_information", {"scipy", "cvxpy"}),
-    ("radio.precoder", {"scipy", "cvxpy"}),
-    ("plan", {"scipy", "cvxpy", "pyproj", "pymavlink"}),
-    ("study", {"scipy", "cvxpy", "joblib", "matplotlib", "pyproj"}),
-    ("report.page", {"scipy", "cvxpy", "matplotlib", "pyproj", "pymavlink"}),
-    ("app.document", {"nicegui", "scipy", "pyproj"}),
-    ("wire.client", {"scipy", "pyproj", "pymavlink.mavutil", "serial"}),
-    ("app.workers", {"nicegui", "cvxpy", "pymavlink"}),
-    ("app.vehicle", {"nicegui", "cvxpy", "pymavlink"}),
+WAITING = dict(
+    line.split(": ") for line in (ROOT / "tests/data/waiting.txt").read_text().splitlines()[1:]
 )
-"""Modules in an order in which one process can import them, and what is absent after each."""
 
 
 def test_costly_imports_wait() -> None:
@@ -125,10 +97,11 @@ def test_costly_imports_wait() -> None:
         "    importlib.import_module('faao_mav.' + name)\n"
         "    print(*sys.modules)"
     )
-    command = [sys.executable, "-c", code, *(name for name, _ in WAITING)]
+    command = [sys.executable, "-c", code, *WAITING]
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     assert len(told) == len(WAITING)
     loaded = {
-        name: absent & set(line.split()) for (name, absent), line in zip(WAITING, told, strict=True)
+        name: set(absent.split()) & set(line.split())
+        for (name, absent), line in zip(WAITING.items(), told, strict=True)
     }
     assert loaded == {name: set() for name in loaded}

@@ -27,6 +27,7 @@ from faao_mav.mission.formats.qgc_plan import read_qgc_plan
 from faao_mav.mission.formats.wpl import read_wpl, read_wpl_fence
 from faao_mav.mission.item import fence_items, home_item
 
+FENCES = Path(__file__).parents[1] / "data" / "fences"
 HOME_ROW = "0\t1\t0\t16\t0\t0\t0\t0\t47.4\t8.5\t400\t1"
 ROW = "1\t0\t3\t16\t0\t0\t0\t0\t47.5\t8.6\t50\t1"
 WPL = f"QGC WPL 110\n{HOME_ROW}\n{ROW}\n"
@@ -154,13 +155,7 @@ def test_files_by_their_ending_the_fence_of_text_files_beside_them(tmp_path: Pat
             read_mission(tmp_path / other)
 
 
-MISSION_PLANNER = """QGC WPL 110
-0\t1\t0\t16\t0\t0\t0\t0\t-35.363262\t149.165237\t584.000000\t1
-1\t0\t3\t5001\t3.00000000\t0.00000000\t0.00000000\t0.00000000\t-35.300000\t149.100000\t100.0\t1
-2\t0\t3\t5001\t3.00000000\t0.00000000\t0.00000000\t0.00000000\t-35.400000\t149.100000\t100.0\t1
-3\t0\t3\t5001\t3.00000000\t0.00000000\t0.00000000\t0.00000000\t-35.400000\t149.200000\t100.0\t1
-4\t0\t3\t5004\t40.50000000\t0.00000000\t0.00000000\t0.00000000\t-35.360000\t149.160000\t100.0\t1
-"""
+MISSION_PLANNER = (FENCES / "mission_planner.waypoints").read_text()
 """A fence in the form in which Mission Planner saves one: a home row, six decimals, heights."""
 
 

@@ -199,15 +199,6 @@ def test_flat_rewards_return_the_start() -> None:
         assert best.value == 2
 
 
-def test_a_long_flight_takes_few_iterations() -> None:
-    """2,000 slots, all in band storage."""
-    long = plane(400, time_step=0.2)
-    many = maximize(long, links(bowl, 1e-5, 2e-5), straight_flight(long))
-    assert many.converged
-    assert many.iterations < 40
-    assert worst(long, many.trajectory) < 1e-6
-
-
 WINDY = plane(60, time_step=1.0, max_speed=17.0, max_airspeed=9.0, wind=(4.0, -6.0))
 
 

@@ -90,15 +90,6 @@ def test_the_sample_delivers_what_ipopt_does(duplex: str, rate: float) -> None:
     assert solution.is_feasible()
 
 
-@pytest.mark.parametrize(("duplex", "buffer", "known"), [("full", 20, 2.1824), ("half", 5, 1.1017)])
-def test_small_buffers_converge(duplex: str, buffer: int, known: float) -> None:
-    changes: dict[str, Any] = {"flight.duration": 120, "flight.time_step": 1}
-    changes |= {"radio.bandwidth_mhz": 20, "radio.relay.buffer_mbytes": buffer}
-    solution = optimize(SAMPLE.changed(changes | {"radio.duplex": duplex}))
-    assert solution.converged
-    assert solution.delivered_rate > known * (1 - 1e-3)
-
-
 def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None:
     path = tmp_path / "result.npz"
     megabyte = {"radio.bandwidth_mhz": 2, "radio.relay.buffer_mbytes": 1}
