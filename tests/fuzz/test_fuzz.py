@@ -14,10 +14,10 @@ from wire_targets import datagrams, wire_targets
 
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
          "map", "map_table", "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
-TAPES = {"client": 15, "mock_ardupilot": 8, "mock_px4": 4}
-SLOW = dict.fromkeys(("bin", "tlog", "ulg", "npz", "gain", "rates", "rows", "vary"), 60)
-CASES = dict.fromkeys(FILES, 120) | SLOW | TAPES
-"""Cases of each target in the suite; chosen: a quarter of a second."""
+TAPES = {"client": 10, "mock_ardupilot": 6, "mock_px4": 4}
+SLOW = dict.fromkeys(("bin", "tlog", "ulg", "npz", "gain", "rates", "rows", "vary"), 30)
+CASES = dict.fromkeys(FILES, 60) | SLOW | TAPES
+"""Cases of each target in the suite; chosen: an eighth of a second."""
 
 # pymavlink leaves a log open that it does not understand
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")

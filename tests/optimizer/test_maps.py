@@ -143,7 +143,7 @@ def delivered(I_U: Real, I_G: Real, kind: str) -> float:
 def test_a_flight_over_maps_is_told_by_the_maps_as_they_are(
     small_plan: MakePlan, changes: dict[str, Any]
 ) -> None:
-    """It is no worse than its starts, than the flight that knows no map, and than 200 others."""
+    """It is no worse than its starts, than the flight that knows no map, and than 60 others."""
     short = {"flight.duration": 18, "flight.time_step": 1}
     plain = build_problem(small_plan(FAINT | short | changes))
     problem = with_maps(plain, 4)
@@ -158,7 +158,7 @@ def test_a_flight_over_maps_is_told_by_the_maps_as_they_are(
     assert {name.split(" ")[0] for name in found.starts} == {"map"}
     assert reached >= max(found.starts.values()) - 1e-6
     assert reached > 1.2 * value(direct(plain).w)
-    others = [random_flight(problem.kinematics, seed).w for seed in range(200)]
+    others = [random_flight(problem.kinematics, seed).w for seed in range(60)]
     assert reached > max(map(value, others))
     assert reached <= upper_bound(problem, reached).value
 

@@ -90,7 +90,7 @@ def test_the_errors_give_the_slope() -> None:
 def test_the_spread_over_seeds_is_the_error() -> None:
     """Beside many times as many noises; more noises err less."""
     H, eye = np.sqrt(2.0) * channel(4, 32, 2, 2), np.eye(2)[None]
-    exact = mutual_information(H, eye, "qpsk", 1.0, nodes=1 << 17).mean()
+    exact = mutual_information(H, eye, "qpsk", 1.0, nodes=1 << 15).mean()
 
     def means(nodes: int) -> list[float]:
         every = (mutual_information(H, eye, "qpsk", 1.0, nodes=nodes, seed=k) for k in range(8))
