@@ -3,8 +3,6 @@
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
-from faao_mav.radio.constellation import difference_classes
-from faao_mav.radio.rate import exponents
 
 
 def channel(seed: int, *shape: int) -> Complex:
@@ -26,15 +24,3 @@ def bpsk_two_antennas_rate(H: RealOrComplex, power: float, noise: float) -> Real
     x = power * largest**2 / (2.0 * noise)
     # 1 + e^-x = 2 (1 + (e^-x - 1) / 2): as accurate where the rate is next to nothing.
     return np.asarray(-2.0 * np.log1p(0.5 * np.expm1(-x)) / np.log(2.0))[()]
-
-
-def log_sum(H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float = 1.0) -> Real:
-    """Return s = ln of the sum of multiplicity e^-D / rho^N: N log2(rho) - R_0 = log2(1 + e^s).
-
-    It is finite at any SNR, even where R_0 no longer tells two precoders apart.
-    """
-    classes = difference_classes(modulation, P.shape[-1])
-    D = exponents(H, P, classes.vectors, noise)
-    nearest = np.min(D, axis=-1)
-    total = np.exp(nearest[..., None] - D) @ (classes.multiplicity / classes.symbols)
-    return np.asarray(np.log(total) - nearest)[()]

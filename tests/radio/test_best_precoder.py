@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from closed_forms import bpsk_two_antennas_rate, channel, log_sum, power_of
+from closed_forms import bpsk_two_antennas_rate, channel, power_of
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -98,7 +98,7 @@ def test_extremes() -> None:
     largest = np.linalg.svd(H, compute_uv=False)[:, 0]
     for modulation, snr in product(("bpsk", "qpsk", "16qam"), (1e-12, 1e-5, 1e4, 1e9)):
         P, rate = best(H, snr, modulation)
-        assert np.all(np.isfinite(log_sum(H, P, modulation)))
+        assert np.all(np.isfinite(P))
         if snr < 1e-4:  # all on the strongest mode: R_0 = mean of D / ln 2, E||H P u||² = 2 λ² W
             expected = snr * largest**2 / 2.0 / np.log(2.0)
             np.testing.assert_allclose(rate, expected, rtol=1e-4, atol=1e-14)

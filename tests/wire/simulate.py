@@ -15,24 +15,16 @@ from faao_mav.wire.protocol import Address
 _STEP = 1e-3  # s, least time between two ticks of a machine that stays due
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Station:
-    """A machine on a simulated link, and the address that it speaks from."""
+    """A machine on a simulated link, the address that it speaks from, and when it ticked last."""
 
     machine: Any
     address: Address
-
-
-@dataclass(slots=True)
-class _Node:
-    station: Station
-    codec: Codec
     ticked: float = -1.0
 
     def due(self) -> float | None:
-        if self.station.machine.outcome is not None:
-            return None
-        deadline = self.station.machine.deadline
+        deadline = None if self.machine.outcome is not None else self.machine.deadline
         return None if deadline is None else max(deadline, self.ticked + _STEP)
 
 
@@ -59,7 +51,8 @@ def simulate(
     their sender, their receiver (0 is the client, 1 the server) and the number of the message.
     """
     faults = faults or Faults()
-    nodes = [_Node(station, Codec(station.address)) for station in (client, server, *others)]
+    nodes = (client, server, *others)
+    codecs = [Codec(node.address) for node in nodes]
     pairs = permutations(range(len(nodes)), 2)
     channels = {pair: Channel(faults, "{} to {}".format(*pair)) for pair in pairs}
     order = count()
@@ -69,7 +62,7 @@ def simulate(
 
     def send(sender: int, messages: Sequence[Message], now: float) -> None:
         for message in messages:
-            packet = nodes[sender].codec.pack(message)
+            packet = codecs[sender].pack(message)
             number = message_id(packet)
             for (start, receiver), channel in channels.items():
                 if start != sender:
@@ -81,7 +74,7 @@ def simulate(
 
     now = 0.0
     for index in range(len(nodes) - 1, -1, -1):  # the client last: the others are there already
-        send(index, nodes[index].station.machine.start(now), now)
+        send(index, nodes[index].machine.start(now), now)
     while client.machine.outcome is None:
         due = [
             (time, index) for index, node in enumerate(nodes) if (time := node.due()) is not None
@@ -98,14 +91,13 @@ def simulate(
             _, _, receiver, packet = heapq.heappop(queue)
             if tapes is not None:
                 tapes[receiver].append(packet)
-            node = nodes[receiver]
-            for envelope in (found.envelope for found in node.codec.parse(packet)):
+            for envelope in (found.envelope for found in codecs[receiver].parse(packet)):
                 if receiver == 0 and heard is not None and envelope is not None:
                     heard(envelope, now)
                 if envelope is not None:
-                    send(receiver, node.station.machine.on(envelope, now), now)
+                    send(receiver, nodes[receiver].machine.on(envelope, now), now)
         else:
             index = min(due)[1]
             nodes[index].ticked = now
-            send(index, nodes[index].station.machine.tick(now), now)
+            send(index, nodes[index].machine.tick(now), now)
     return now
