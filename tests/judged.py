@@ -6,7 +6,8 @@ The words of a line, in any order but for the items, which are flown in theirs:
 - `max_altitude=50` and so forth: a limit; `airborne`; `home=LATITUDE,LONGITUDE,HEIGHT`, `homeless`;
 - `energy=WH,W`: what the flight takes of 100 Wh, 20 % of which are kept, and the least power;
 - `link`, `link.NAME=VALUE`: a plan that is delivered, but for a value of `LinkCheck`;
-- `predicted`: the flight is; `fly:PACE;PLACE;PLACE,INDEX;...`: it is so, at m/s, to these items;
+- `predicted`: the flight is, `unpredicted`: it cannot be; `fly:PACE;PLACE;PLACE,INDEX;...`: it is
+  so, at m/s, to these items;
 - `square:SIDE,EAST`, `area:PLACE;...`, `disc:PLACE,RADIUS`: inclusions, the square about home or
   a place east of it; `zone:PLACE,RADIUS`: an exclusion; `rally:PLACE`, `back:PLACE`: where a
   return, and one after a breach, ends;
@@ -140,6 +141,8 @@ def given(line: str) -> Given:
             case["link"] = LINK if kind == "link" else case.get("link")
         elif head in ("airborne", "predicted"):
             case[head] = True
+        elif head == "unpredicted":
+            case[head] = "the flight would take too long"
         elif head in ("home", "homeless"):
             home = Home(*first) if first else None
         elif head == "energy":

@@ -123,7 +123,8 @@ def check(
         link, prediction = compare_with_plan(solution, track)
         energy = energy_use(solution.plan, track.t, track.velocity, wind, lands=track.lands)
     airborne = solution is not None and not solution.plan.mission.takeoff
-    beside = (track, limits or Limits(), link, airborne, energy)
+    why = "" if solution is None else unpredicted
+    beside = (track, limits or Limits(), link, airborne, energy, why)
     findings = validate(ValidationContext(mission, vehicle, *beside))
     return Check(mission, vehicle, track, unpredicted, link, findings, wind, energy, prediction)
 

@@ -90,7 +90,8 @@ class ValidationContext:
     `track` is the predicted flight, if that is known: with it speeds, heights, duration and fence
     are judged along the flight as well as along the straights between the items. `limits` are what
     the flight must stay within; `link` says what of a plan's rate it delivers, and `energy` what it
-    takes. `airborne`: it is begun in the air, and needs no take-off.
+    takes; where there is a plan and no track `unpredicted` says why. `airborne`: it is begun in the
+    air, and needs no take-off.
     """
 
     mission: Mission
@@ -100,6 +101,7 @@ class ValidationContext:
     link: LinkCheck | None = None
     airborne: bool = False
     energy: EnergyUse | None = None
+    unpredicted: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vehicle", self.vehicle.usable())

@@ -14,6 +14,8 @@ from faao_mav.validate.rule import Hits, checks, hit, threshold
 def _link(context: ValidationContext) -> Hits:
     """What is wrong with the plan itself, and how the flight carries it out."""
     link = context.link
+    if context.unpredicted:
+        yield hit("link-not-predicted", why=context.unpredicted)
     if link is None:
         return
     if link.planned_delivered < threshold.nothing:
