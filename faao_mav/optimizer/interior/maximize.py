@@ -9,7 +9,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import ALLOWED, A, Constraint, V, every_excess, unknowns
 from faao_mav.optimizer.interior.limits import Disc, SpeedChange, TurnRate
-from faao_mav.optimizer.interior.rewards import Queue, Rewards, Stage, StageValues
+from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValues
 from faao_mav.optimizer.interior.search import COLD, SLOW, WARM, Search
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -77,7 +77,7 @@ def maximize(
     search = Search(
         kin,
         (*constraints_of(kin), *constraints),
-        rewards if relay is None else Queue(rewards, relay, kin.time_step),
+        Goal(rewards, relay, kin.time_step),
         unknowns(kin, start),
         tolerance=tolerance,
         mu=WARM if warm else SLOW if kin.min_speed > 0 else COLD,
@@ -174,7 +174,8 @@ def nearest_flight(
         rewards = Rewards(Closeness(path), start.w.T)
         if rewards.flat:
             continue
-        search = Search(kin, every, rewards, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
+        goal = Goal(rewards, None, kin.time_step)
+        search = Search(kin, every, goal, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
         for most in range(_LOOK, _MOST_STEPS + 1, _LOOK) if first else (_MOST_STEPS,):
             with np.errstate(all="ignore"):
                 converged = search.run(most)

@@ -8,8 +8,7 @@ With unknowns x, inequalities g(x) >= 0 of slacks s and multipliers z, which s m
 
 with + for new multipliers, J the gradients of g, c that of the objective and H the Hessian of the
 Lagrangian, as much of it as leaves the model convex. Slot by slot z+ is eliminated, which adds
-J^T (z / s) J to H. Sums over all slots, F_j - t >= 0 of rewards and a budget of energy, are a
-border of the banded matrix; the unknown t is in the border too.
+J^T (z / s) J to H. Sums over all slots, as of energy, are a border of the banded matrix.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,11 +23,6 @@ from faao_mav.optimizer.interior.rewards import Goal
 
 _SHARES = (0.9, 0.75, 0.5, 0.25)
 """Shares of the curvature of the wrong sign that are tried before it is cut. Chosen."""
-
-_BARRIER_SHARE = 0.1
-"""c / n: the weight of the barrier that keeps t below the F_j, in those of a slot's limits.
-
-Chosen: half or twice as much cost 3 to 4 % more iterations of an earlier form of this search."""
 
 _PENALTY = 1e8
 """What a squared miss of the equations weighs where signs of curvature are told: far more than any
@@ -144,8 +138,8 @@ class System:
     """What a search keeps and maximises, and its places among the unknowns of a slot.
 
     The m inequalities are those of the slots where they are `on` (rows, n), then the sums, from
-    `first_sum` on, the rewards first. `weight` (m,) is that of the barrier, `each` (m,) one, for
-    sums one per slot; `floored` (m,) is one for rewards, `turns` (m,) tells which half-planes turn.
+    `first_sum` on. `each` (m,) is one, for sums one per slot; `turns` (m,) tells which half-planes
+    turn.
     """
 
     def __init__(self, grid: Grid, goal: Goal, constraints: Sequence[Constraint], x: Real) -> None:
@@ -179,8 +173,6 @@ class System:
         self.headroom = of_each(lambda each, slots: slots * each.headroom)
         self.each = of_each(lambda _, slots: 1 / slots)
         self.turns = of_each(lambda each, _: each.turns) > 0
-        self.floored = of_each(lambda each, _: each is goal and goal.total)
-        self.weight = np.where(self.floored, _BARRIER_SHARE * n, 1.0)
         # positions, speeds and what else the goal says are held by the proximal term
         self.held = [*W, *V, *(COMMON + place for place in goal.held)]
 
@@ -255,14 +247,13 @@ class System:
 
 @dataclass(frozen=True, slots=True)
 class Iterate:
-    """Functions `at` x, multipliers y, slacks s, multipliers z and margins (m,), the floor t."""
+    """Functions `at` x, multipliers y, slacks s, multipliers z and margins (m,)."""
 
     at: Functions
     y: Real
     s: Real
     z: Real
     margin: Real
-    floor: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,7 +264,6 @@ class Direction:
     y: Real
     s: Real
     z: Real
-    floor: float
     bend: float
 
 
@@ -285,7 +275,7 @@ def newton_direction(system: System, iterate: Iterate, mu: float, proximal: floa
     at, chain, first = iterate.at, system.chain, system.first_sum
     (k, n), sums = at.x.shape, len(at.slopes)
     weights = iterate.z / iterate.s
-    target = system.weight * mu / iterate.s
+    target = mu / iterate.s
     stiff = system.stiffness(at, weights)
     held = np.zeros((k, k, 1))
     held[system.held, system.held] = proximal
@@ -299,22 +289,16 @@ def newton_direction(system: System, iterate: Iterate, mu: float, proximal: floa
     right[sums, k:, :-1] = -chain.missed(at.x)
     solved = chain.solved(H + stiff, right)
     columns, alone = solved[:sums], solved[sums]
-    border = np.zeros((sums + 1, sums + 1))
-    border[:sums, :sums] = np.einsum("ikn,jkn->ij", at.slopes, columns[:, :k])
-    border[range(sums), range(sums)] += 1 / weights[first:]
-    rewards = system.floored[first:]
-    border[:sums, sums], border[sums, :sums] = -1.0 * rewards, rewards
-    border[sums, sums] = not rewards.any()
-    missing = np.append((target / weights + iterate.margin)[first:], float(system.goal.total))
-    missing[:sums] -= np.einsum("tkn,kn->t", at.slopes, alone[:k])
-    of_sums = np.linalg.solve(border, missing)
-    both = alone + np.einsum("t,tkn->kn", of_sums[:sums], columns)
-    x, y, rise = both[:k], both[k:, :-1], float(of_sums[-1])
-    s = system.along(at, x) - iterate.margin - rise * system.floored
+    border = np.einsum("ikn,jkn->ij", at.slopes, columns[:, :k]) + np.diag(1 / weights[first:])
+    missing = (target / weights + iterate.margin)[first:]
+    of_sums = np.linalg.solve(border, missing - np.einsum("tkn,kn->t", at.slopes, alone[:k]))
+    both = alone + np.einsum("t,tkn->kn", of_sums, columns)
+    x, y = both[:k], both[k:, :-1]
+    s = system.along(at, x) - iterate.margin
     z = target - weights * s
-    z[first:] = of_sums[:sums]
+    z[first:] = of_sums
     bend = float(np.einsum("in,ijn,jn->", x, H, x))
-    return Direction(x, y - iterate.y, s, z - iterate.z, rise, bend)
+    return Direction(x, y - iterate.y, s, z - iterate.z, bend)
 
 
 def _convex_part(chain: Chain, whole: Real, more: Real) -> Real:

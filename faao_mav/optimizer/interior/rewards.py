@@ -1,7 +1,6 @@
 """What a flight maximises: the smallest of the sums of some rewards of its slots, or a queue's."""
 
 import math
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -38,76 +37,37 @@ class Stage(Protocol):
         """Return the rewards at w (2, ..., n), m; not-a-number where there is none."""
 
 
-class Goal(Constraint):
-    """What is maximised, with the `own` unknowns per slot that it takes beside `of`.
+class Rewards:
+    """f_j of a `stage` in a `unit`: the largest gradient at the start w (2, n), m.
 
-    `slope` (own,) is the objective's. The unknowns of a slot and the next one keep
-    `after` x_{n+1} = `before` x_n, both (k, own).
+    `base` are those of the start, `flat` tells that there is no gradient.
     """
-
-    of = W
-    inside = 0.0
-    noise: float
-    held: tuple[int, ...] = ()
-    slope: Real = np.zeros(0)
-    before: Real = np.zeros((0, 0))
-    after: Real = np.zeros((0, 0))
-
-    @abstractmethod
-    def begin(self, *, cold: bool) -> Real:
-        """Return its unknowns (own, n) to begin with."""
-
-    def free(self, slots: int) -> Flags:
-        """Return which of its unknowns are not given, (own, `slots`)."""
-        return np.ones((len(self.slope), slots), dtype=np.bool_)
-
-    def excess(self, kin: Kinematics, flight: Trajectory) -> float:  # noqa: ARG002
-        """Return 0: every flight has its rewards."""
-        return 0.0
-
-
-class Rewards(Goal):
-    """min_j F_j, the sums of `stage` over the slots, relative to a start: small gains keep digits.
-
-    The unit is the largest gradient at the start w (2, n), m. `flat` tells that there is none.
-    """
-
-    total = True
-    headroom = 0.0
 
     def __init__(self, stage: Stage, w: Real) -> None:
-        self.stage, self.values = stage, stage(w)
-        self.base = self.values.value
+        self.stage, values = stage, stage(w)
+        self.base = values.value
         first = self.base.mean(axis=-1, keepdims=True)
-        steepest = np.abs(self.values.gradient).max(axis=(0, -1))[:, None] * LENGTH
-        self.above = first - first.min(axis=0)
+        steepest = np.abs(values.gradient).max(axis=(0, -1))[:, None] * LENGTH
         # an F_j far above the least one has no say in the unit
-        unit = float((steepest**2 / np.maximum(steepest + self.above, TINY)).max())
+        above = np.maximum(steepest + first - first.min(axis=0), TINY)
+        unit = float((steepest**2 / above).max())
         self.flat = not unit > _FLAT * np.abs(first).max()
         self.unit = 1.0 if self.flat else unit
         rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1).max()
         self.noise = 1e-9 + rounding / self.unit
 
-    def begin(self, *, cold: bool) -> Real:  # noqa: ARG002
-        """Return no unknowns."""
-        return np.zeros((0, self.base.shape[-1]))
-
-    def scaled(self, w: Real, base: Real | float = 0.0) -> tuple[Real, Real, Real]:
-        """Return rewards above `base` at scaled w (2, n), with derivatives as `Rows` has them."""
+    def scaled(self, w: Real) -> tuple[Real, Real, Real]:
+        """Return the rewards at scaled w (2, n), with derivatives as `Rows` has them."""
         at = self.stage(w * LENGTH)
         return (
-            (at.value - base) / self.unit,
+            at.value / self.unit,
             at.gradient.swapaxes(0, 1) * (LENGTH / self.unit),
             at.hessian[PACKED].transpose(2, 0, 1, 3) * (LENGTH**2 / self.unit),
         )
 
-    def rows(self, x: Real) -> Rows:
-        """Return the rewards relative to those of the start."""
-        return Rows(*self.scaled(x, self.base - self.above))
 
-
-class Queue(Goal):
-    """sum_n f_n of what a relay forwards of two rates.
+class Goal(Constraint):
+    """What is maximised: the sum of one reward, or of what is forwarded of two rates.
 
         q_0 = 0,  q_{n+1} = q_n + r_n - f_n,  f_n <= q_n,  q_n <= buffer
         r_n <= x_n I_U(w_n),  f_n <= (1 - x_n) I_G(w_n),  0 <= x_n <= 1
@@ -115,67 +75,91 @@ class Queue(Goal):
     for half duplex, and with r_n <= I_U(w_n), f_n <= I_G(w_n) for full duplex: see `radio.relay`.
     That r and f are at least 0 need not be said: received less than nothing can be taken off an
     earlier slot. In slot 0 nothing can be forwarded, and what the last receives is worth nothing.
+    For min(R_U, R_G), without a relay, more may be forwarded than was received before, not in all.
+
+    Beside `of` it has the unknowns r, f, q and x of each slot, of one reward r alone. The
+    objective is `slope` times these (own,); they keep `after` x_{n+1} = `before` x_n, (k, own).
     """
 
+    of = W
+    inside = 0.0
     headroom = 20.0  # measured: with 0.1 and with 2 two of 16 planes lose 1 to 3 %
 
-    def __init__(self, rewards: Rewards, relay: RelayQueue, time_step: float) -> None:
-        self.rewards, self.relay = rewards, relay
-        self.noise = rewards.noise
-        self.buffer = relay.buffer / time_step / rewards.unit
-        self.own = 4 if relay.half else 3
-        self.held = (3,) if relay.half else ()
-        self.slope = np.eye(self.own)[2]
-        self.after = np.eye(1, self.own)
-        self.before = np.array([[1.0, 1.0, -1.0, 0.0]])[:, : self.own]
+    def __init__(self, rewards: Rewards, relay: RelayQueue | None, time_step: float) -> None:
+        self.rewards, self.noise = rewards, rewards.noise
+        self.causal, self.half = relay is not None, relay is not None and relay.half
+        self.buffer = math.inf if relay is None else relay.buffer / time_step / rewards.unit
+        hops = len(rewards.base)
+        self.own = own = 1 if hops == 1 else 4 if self.half else 3
+        self.held = (3,) if self.half else ()
+        self.slope = np.eye(own)[hops - 1]
+        self.before = np.array([[1.0, -1.0, 1.0, 0.0]])[: hops - 1, :own]
+        self.after = np.array([[0.0, 0.0, 1.0, 0.0]])[: hops - 1, :own]
 
     def begin(self, *, cold: bool) -> Real:
-        """Return q, r, f and x: what is forwarded greedily."""
-        rates = self.rewards.base
-        I_U, I_G = rates / self.rewards.unit
-        n = len(I_U)
-        x = np.full(n, 0.5) if self.relay.half else np.ones(n)
-        if self.relay.half and not cold:
-            room = self.buffer * self.rewards.unit
-            x = np.clip(best_shares(rates[0], rates[1], room), _LEAST_SHARE, 1 - _LEAST_SHARE)
-        found = forward_greedily(x * I_U, (1 - x if self.relay.half else x) * I_G, self.buffer)
-        own = np.stack([found.queue, found.received, found.forwarded, x])[: self.own]
+        """Return its unknowns (own, n) to begin with: what is forwarded greedily."""
+        rates = self.rewards.base / self.rewards.unit
+        if self.own == 1:
+            return rates
+        I_U, I_G = rates
+        n, x = len(I_U), np.full(len(I_U), 0.5)
+        if not self.causal:
+            f = min(1.0, float(I_U.sum() / max(I_G.sum(), TINY))) * I_G
+            return np.stack([I_U, f, np.cumsum(I_U - f) - I_U + f])
+        if self.half and not cold:
+            x = np.clip(best_shares(I_U, I_G, self.buffer), _LEAST_SHARE, 1 - _LEAST_SHARE)
+        come, gone = (x * I_U, (1 - x) * I_G) if self.half else (I_U, I_G)
+        found = forward_greedily(come, gone, self.buffer)
+        own = np.stack([found.received, found.forwarded, found.queue, x])[: self.own]
         return np.asarray(own * self.free(n))
 
     def free(self, slots: int) -> Flags:
-        """Return which unknowns are not given: q_0 = f_0 = 0, and the last r is worth nothing."""
-        free = super().free(slots)
-        free[[0, 2], 0] = free[1, -1] = False
+        """Return which of its unknowns are not given, (own, `slots`)."""
+        free = np.ones((self.own, slots), dtype=np.bool_)
+        free[2:3, 0] = False
+        if self.causal:
+            free[1, 0] = free[0, -1] = False
         return free
 
     def rows(self, x: Real) -> Rows:
         """Return x I_U - r, (1 - x) I_G - f, q - f, and what is left of shares and buffer."""
-        (q, r, f), n = x[2:5], x.shape[1]
-        (I_U, I_G), gradient, hessian = self.rewards.scaled(x[:2])
-        shares = np.stack([x[5], 1 - x[5]]) if self.relay.half else np.ones((2, n))
-        value = [shares[0] * I_U - r, shares[1] * I_G - f, q - f]
+        own, n = x[2:], x.shape[1]
+        rates, gradient, hessian = self.rewards.scaled(x[:2])
+        hops, half = len(rates), self.half
+        shares = np.stack([own[3], 1 - own[3]]) if half else np.ones((hops, n))
         slope = np.zeros((6, 2 + self.own, n))
         bend = np.zeros((6, 2 + self.own, 2 + self.own, n))
-        slope[:2, :2] = shares[:, None] * gradient
-        bend[:2, :2, :2] = shares[:, None, None] * hessian
-        slope[0, 3] = slope[1, 4] = slope[2, 4] = -1
-        slope[2, 2] = 1
+        slope[:hops, :2] = shares[:, None] * gradient
+        bend[:hops, :2, :2] = shares[:, None, None] * hessian
+        value = [*(shares * rates - own[:hops])]
+        slope[range(hops), range(2, 2 + hops)] = -1
+        if hops == 2:
+            come = 0.0 if self.causal else 1.0
+            value.append(own[2] - own[1] + come * own[0])
+            slope[2, 2:5] = np.array([[come], [-1.0], [1.0]])
         if math.isfinite(self.buffer):
-            slope[len(value), 2] = -1
-            value.append(self.buffer - q)
-        if self.relay.half:
-            slope[0, 5], slope[1, 5] = I_U, -I_G
+            slope[len(value), 4] = -1
+            value.append(self.buffer - own[2])
+        if half:
+            slope[0, 5], slope[1, 5] = rates[0], -rates[1]
             bend[0, 5, :2] = bend[0, :2, 5] = gradient[0]
             bend[1, 5, :2] = bend[1, :2, 5] = -gradient[1]
             slope[len(value), 5], slope[len(value) + 1, 5] = 1, -1
-            value += [x[5], 1 - x[5]]
+            value += [own[3], 1 - own[3]]
         m = len(value)
         return Rows(np.stack(value), slope[:m], bend[:m])
 
     def on(self, grid: Grid, rows: int) -> Flags:
         """Return where each row holds, (rows, n)."""
         on = np.ones((rows, grid.slots), dtype=np.bool_)
-        on[0, -1] = on[1:3, 0] = False
+        if self.causal:
+            on[0, -1] = on[1:3, 0] = False
+        else:
+            on[2:, :-1] = False
         if math.isfinite(self.buffer):
             on[3, 0] = False
         return on
+
+    def excess(self, kin: Kinematics, flight: Trajectory) -> float:  # noqa: ARG002
+        """Return 0: every flight has its rewards."""
+        return 0.0

@@ -15,7 +15,6 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, V
 from faao_mav.optimizer.interior.newton import (
     Direction,
-    Functions,
     Iterate,
     System,
     newton_direction,
@@ -64,23 +63,6 @@ _WARM_ROOM = 0.03
 """The share of the `headroom` that nearly optimal starts are given. Chosen."""
 
 
-def best_floor(total: Real, weight: float) -> float:
-    """Return the t that maximises t + `weight` sum_j log(total_j - t) of `total` (J,).
-
-    >>> best_floor(np.array([3.0]), 0.5)
-    2.5
-    """
-    floor = float(total.min()) - weight
-    # from above the optimum, where the gradient is convex in t, Newton's method is monotone
-    for _ in range(50):
-        per_gap = 1 / (total - floor)
-        excess = weight * float(per_gap.sum()) - 1
-        if abs(excess) < 1e-12:
-            break
-        floor -= excess / (weight * float((per_gap * per_gap).sum()))
-    return floor
-
-
 class Search:
     """A search from the unknowns w, v, a (6, n) of a start, in solver units.
 
@@ -105,11 +87,7 @@ class Search:
         at = system.at(x)
         s = np.maximum(at.values, (1.0 if mu > WARM else _WARM_ROOM) * system.headroom)
         y = np.zeros((len(system.chain.after), kin.slots - 1))
-        floor, s = self._floor(at, s)
-        z = np.where(system.floored, 1.0, system.weight * self.mu) / s
-        self.iterate = Iterate(
-            at, y, s, self._weighted(z), np.where(system.floored, 0.0, s - at.values), floor
-        )
+        self.iterate = Iterate(at, y, s, self.mu / s, s - at.values)
         self.proximal, self.steepness = 0.0, 1.0
         self.iterations = self.attempts = self.short = self.centrings = 0
         self.best, self.v, self.residual = -np.inf, x[list(V)], np.inf
@@ -127,19 +105,6 @@ class Search:
                 return False
             self._advance(slope)
 
-    def _floor(self, at: Functions, s: Real) -> tuple[float, Real]:
-        """Return t at its optimum, and the slacks s (m,) with those of the rewards above t."""
-        floored = self.system.floored
-        if not floored.any():
-            return 0.0, s
-        floor = best_floor(at.values[floored], self.mu * float(self.system.weight[floored][0]))
-        return floor, np.where(floored, at.values - floor, s)
-
-    def _weighted(self, z: Real) -> Real:
-        """Return the multipliers z (m,) with those of the rewards summing to one."""
-        floored = self.system.floored
-        return np.where(floored, z / float(z[floored].sum()), z) if floored.any() else z
-
     def _measure(self) -> tuple[float, float]:
         """Return the scaled gradient of the Lagrangian and the residual; note the best iterate."""
         system, it = self.system, self.iterate
@@ -150,10 +115,7 @@ class Search:
         # what is missed in second order counts tenfold
         broken = 10 * float((system.each * np.abs(it.margin)).max())
         broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
-        if self.goal.total:
-            value = float(at.values[system.floored].min())
-        else:
-            value = float((system.objective * at.x).sum())
+        value = float((system.objective * at.x).sum())
         kept = broken < self.tolerance
         if (kept and value > self.best) or self.best == -np.inf:
             self.best, self.v = value if kept else -np.inf, at.x[list(V)]
@@ -200,7 +162,7 @@ class Search:
     def _lower_mu(self, slope: float) -> None:
         """Lower mu where the scaled gradient `slope` tells that the iterate is near its optimum."""
         solved = slope * self.steepness < self.mu or slope < self.tolerance
-        per_slot = float(self.system.weight.sum()) / self.iterate.at.x.shape[1]
+        per_slot = len(self.iterate.s) / self.iterate.at.x.shape[1]
         least = self.tolerance * _LEAST_GAP * self.steepness / per_slot
         self.mu = max(self.mu * (_FALL if solved else 1.0), least)
 
@@ -213,7 +175,7 @@ class Search:
         if not np.isfinite(at.values.sum() + at.slopes.sum()):
             return False
         s, z = it.s + share * step.s, it.z + share * step.z
-        margin = s - at.values + (it.floor + share * step.floor) * system.floored
+        margin = s - at.values
         more = z * (margin - (1 - share) * it.margin)
         missing = float(more[~system.turns].sum())
         decrease = step.bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
@@ -225,9 +187,7 @@ class Search:
         margin = np.where(system.turns, left, margin)
         s = np.where(system.turns, at.values + left, s)
         y = it.y + (1.0 if self.iterations == 1 else share) * step.y
-        floor, s = self._floor(at, s)
-        margin = np.where(system.floored, 0.0, margin)
-        self.iterate = Iterate(at, y, s, self._weighted(z), margin, floor)
+        self.iterate = Iterate(at, y, s, z, margin)
         return True
 
     def _centre(self) -> None:
@@ -235,10 +195,8 @@ class Search:
         it = self.iterate
         self.mu = min(
             COLD * self.steepness,
-            _CENTRING * float(it.s @ it.z / self.system.weight.sum()),
+            _CENTRING * float(it.s @ it.z) / len(it.s),
         )
-        floor, s = self._floor(it.at, it.s)
-        z = np.where(self.system.floored, it.z, self.system.weight * self.mu / s)
-        self.iterate = replace(it, s=s, z=z, floor=floor)
+        self.iterate = replace(it, z=self.mu / it.s)
         self.proximal, self.attempts, self.short = 0.0, 0, 0
         self.centrings += 1
