@@ -104,7 +104,7 @@ class Goal(Constraint):
         I_U, I_G = rates
         n, x = len(I_U), np.full(len(I_U), 0.5)
         if not self.causal:
-            f = min(1.0, float(I_U.sum() / max(I_G.sum(), TINY))) * I_G
+            f = I_G - max(0.0, float(I_G.mean() - I_U.mean()))
             return np.stack([I_U, f, np.cumsum(I_U - f) - I_U + f])
         if self.half and not cold:
             x = np.clip(best_shares(I_U, I_G, self.buffer), _LEAST_SHARE, 1 - _LEAST_SHARE)
