@@ -46,9 +46,9 @@ from faao_mav.radio.rate import exponents
 MAX_CONES = 300_000
 """Exponential cones accepted in a convex problem: slots times classes, both links. Chosen."""
 
-_MAX_STEPS, _MIN_DECREASE = 20, 1e-4
-"""Convex problems per step of Algorithm 1 at most, and the decrease of the objective, relative to
-its gap, below which a step ends. Chosen: the paper gives no number."""
+_MIN_DECREASE = 1e-4
+"""The decrease of the objective, relative to its gap, below which a step of Algorithm 1 ends.
+Chosen: the paper gives no number."""
 
 _NEGLIGIBLE = 1e-12
 """Gap of the objective, as a part of its largest value, that counts as zero: rounding errors."""
@@ -316,10 +316,7 @@ def _successively(
     convex problem about a point with a gap.
     """
     point, value = start, objective(start)
-    for _ in range(_MAX_STEPS):
-        gap = value - floor
-        if gap <= _NEGLIGIBLE * scale:
-            break
+    while (gap := value - floor) > _NEGLIGIBLE * scale:
         candidate = solve_about(point, float(f"{gap:.{_DECIMALS}g}"))
         reached = objective(candidate)
         decrease = max(0.0, value - reached)

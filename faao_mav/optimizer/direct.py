@@ -189,7 +189,7 @@ class _Search:
     def followed(self, start: Trajectory, *, warm: bool = True) -> LocalOptimum:
         """Return what is found from `start`: over maps close by, by the maps as they are."""
         if self.problem.mapped:
-            return improved_over_map(self.problem, self.field, start)
+            return improved_over_map(self.problem, self.field, start, self.most_steps)
         tolerance = self.problem.plan.optimizer.tolerance
         return self.problem.improved(self.field, start, tolerance, self.most_steps, warm=warm)
 

@@ -2,7 +2,7 @@
 
 Under the paper's law the lowest height is the best wherever the stations are; under a law with
 terms over the elevation, over a map or beside ground it is not, and it may have several local
-optima. Heights are tried at even distances, and those about the best ones to the end: each is a
+optima. Heights are tried at even distances, and those about each optimum to the end: each is a
 whole plan, which begins with the flight of the last.
 """
 
@@ -22,8 +22,8 @@ from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
 from faao_mav.plan.sections import Heights
 
-_EVENLY, _REFINED = 9, 2
-"""Heights that are tried at first, and local optima among them that are then sought. Chosen."""
+_EVENLY = 9
+"""Heights that are tried at first; local optima among them are then sought. Chosen."""
 
 _DECIMALS = 1
 """Decimals of a height, m: missions and aircraft keep no finer one. Chosen."""
@@ -111,7 +111,7 @@ def best_height(plan: Plan, solve: Solve) -> Solution:
     inner = values[1:-1]
     peaks = np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]) & np.isfinite(inner))
     least = float(inner[np.isfinite(inner)].min()) - 1.0  # instead of what has no flight
-    for k in peaks[np.argsort(-inner[peaks], kind="stable")][:_REFINED]:
+    for k in peaks.tolist():
         about = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
         minimize_scalar(
             lambda height: -max(worth(height), least),

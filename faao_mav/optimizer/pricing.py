@@ -41,8 +41,8 @@ _FRESH_DRAWS, _FRESH_SLOTS = 64, 256
 """New draws of the fading per slot where one precoder serves all draws, and slots with some, at
 most. Chosen."""
 
-_MAX_SPARE_DB, _SPARE_ERROR = 300.0, 0.001
-"""The largest spare power that is looked for, dB: beyond any link; and its error. Chosen."""
+_MAX_SPARE_DB = 300.0
+"""The largest spare power that is looked for, dB: beyond any link. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,18 +191,16 @@ def saturation(solution: Solution) -> Saturation:
     >>> saturation(optimize(plan)).saturated
     False
     """
+    from scipy.optimize import brentq  # slow to load
+
     problem, n = solution.problem, len(solution.w)
     full = np.array([[link.most] for link in problem.links])
     ceiling = problem.value(full.repeat(n, axis=1))
 
-    def enough(db: float) -> bool:
+    def spare(db: float) -> float:
         rates = np.array(solution.recomputed_slots(10 ** (-db / 10)))
-        return problem.value(rates, solution.shares) >= SATURATED * ceiling
+        return problem.value(rates, solution.shares) - SATURATED * ceiling
 
-    if solution.maximised < SATURATED * ceiling:
+    if spare(0.0) < 0:
         return Saturation(ceiling, 0.0)
-    low, high = 0.0, _MAX_SPARE_DB
-    while high - low > _SPARE_ERROR:
-        middle = (low + high) / 2
-        low, high = (middle, high) if enough(middle) else (low, middle)
-    return Saturation(ceiling, low)
+    return Saturation(ceiling, float(brentq(spare, 0.0, _MAX_SPARE_DB)))

@@ -37,8 +37,8 @@ so many legs. Chosen: each leg is left out once."""
 _PACE = 1.0
 """Metres between two means below which they are a hover's, which has no course. Chosen."""
 
-_APART = 10.0
-"""Metres between heights that are left out one by one. Chosen: twice what a copter holds."""
+APART = 10.0
+"""Metres between heights that are told apart. Chosen: twice what a copter holds."""
 
 _SINES, _POWERS, _SWING = np.linspace(0.0, 1.0, 101)[:, None], np.arange(1, TERMS + 1), 40.0
 """Sines from the horizon to the zenith, and dB by which the terms of the elevation may differ
@@ -278,13 +278,13 @@ def legs_of(means: Sequence[Samples]) -> Integers:
 def _heights(up: Real, legs: Integers) -> Integers:
     """Return the number of each mean's height, (k,): that of a level leg, or the nearest one's.
 
-    `up` (k,) are heights, m; those of different numbers are `_APART` apart.
+    `up` (k,) are heights, m; those of different numbers are `APART` apart.
     """
     flown = [up[legs == leg] for leg in range(int(legs.max()) + 1)]
-    level = np.sort([np.median(leg) for leg in flown if np.ptp(leg) < _APART])
+    level = np.sort([np.median(leg) for leg in flown if np.ptp(leg) < APART])
     if len(level) == 0:
         return np.zeros(len(up), dtype=np.int_)
-    cuts = np.flatnonzero(np.diff(level) > _APART)
+    cuts = np.flatnonzero(np.diff(level) > APART)
     return np.searchsorted((level[cuts] + level[cuts + 1]) / 2.0, up)
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.radio.fit import LinkFit, legs_of
+from faao_mav.radio.fit import APART, LinkFit, legs_of
 from faao_mav.radio.gain_map import GainMap
 
 _MOST_MEANS = 1000
@@ -22,8 +22,8 @@ _NUGGETS, _LENGTHS = (0.3, 0.5, 0.7, 0.9), (0.5, 1.0, 2.0)
 _REACH = 2.0
 """Lengths L beyond the log to which the map goes. Chosen: an eighth is left there."""
 
-_MOST_POINTS, _MOST_UP, _APART = 120, 8, 10.0
-"""Steps of the map each way and up at most, and metres of those up at least. Chosen."""
+_MOST_POINTS, _MOST_UP = 120, 8
+"""Steps of the map each way and up at most. Chosen."""
 
 
 def kriged(fit: LinkFit, station: Sequence[float]) -> tuple[GainMap | None, float, float]:
@@ -50,9 +50,9 @@ def kriged(fit: LinkFit, station: Sequence[float]) -> tuple[GainMap | None, floa
     least, most = place.min(axis=0) - _REACH * length, place.max(axis=0) + _REACH * length
     count = np.clip((most - least)[:2] * 4 / length, 2, _MOST_POINTS).astype(int)
     east, north = (np.linspace(least[i], most[i], count[i]) for i in range(2))
-    up = np.round(place[:, 2] / _APART)
+    up = np.round(place[:, 2] / APART)
     step = np.ceil(np.ptp(up) / _MOST_UP) or 1.0
-    heights = _APART * np.arange(up.min(), up.max() + step, step)
+    heights = APART * np.arange(up.min(), up.max() + step, step)
     db = np.empty((len(heights), len(north), len(east)))
     for j, m in np.ndindex(db.shape[:2]):
         row = np.stack(np.broadcast_arrays(east, north[m], heights[j]), axis=-1)

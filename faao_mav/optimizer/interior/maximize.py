@@ -20,10 +20,6 @@ _TOLERANCE = 1e-4
 _MOST_STEPS = 200
 """Steps after which a search ends. Chosen."""
 
-_LOOK = 5
-"""Steps after which it is looked again for a flight that keeps the limits, where any one will do.
-Chosen."""
-
 
 @dataclass(frozen=True, slots=True)
 class LocalOptimum:
@@ -176,7 +172,7 @@ def nearest_flight(
             continue
         goal = Goal(rewards, None, kin.time_step)
         search = Search(kin, every, goal, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
-        for most in range(_LOOK, _MOST_STEPS + 1, _LOOK) if first else (_MOST_STEPS,):
+        for most in range(1, _MOST_STEPS + 1) if first else (_MOST_STEPS,):
             with np.errstate(all="ignore"):
                 converged = search.run(most)
             start = kin.follow(search.v.T * kin.max_speed)

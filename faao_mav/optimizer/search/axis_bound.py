@@ -17,14 +17,14 @@ from faao_mav.arrays import Flags, Integers, Real
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.best_rates import BestRates
 from faao_mav.optimizer.search.map_bound import PARTS, at_ends, best_price
-from faao_mav.optimizer.search.sweep import largest_within
+from faao_mav.optimizer.search.sweep import MOST_INSTANTS, largest_within
 
 _BEYOND = 40.0
 """How far the axis goes beyond stations and ends, m; farther out counts as there. Chosen."""
 
-_INTERVAL, _MOST_INSTANTS, _MOST_CELLS = 2.4, 50, 100_000
-"""Time between instants, s, at least; instants of a flight, and cells at one, at most: where a_max
-is small the instants lie farther apart. Chosen."""
+_INTERVAL, _MOST_CELLS = 2.4, 100_000
+"""Time between instants, s, at least; and cells at one, at most: where a_max is small the instants
+lie farther apart. Chosen."""
 
 _APART = (-0.05, -0.01, 0.01, 0.05)
 """Prices of the bound beside that of the lowest bound in coarse cells. Several part the flights by
@@ -70,7 +70,7 @@ class AxisBound:
         extent = float(np.ptp(self.places[0])) + 2 * _BEYOND
         crossed = 4 * self.speeds**2 * kin.max_speed * extent / kin.max_acceleration**2
         least = max(_INTERVAL, (crossed / _MOST_CELLS) ** (1 / 3))
-        count = max(1, min(int(lasting / least), _MOST_INSTANTS, len(inner)))
+        count = max(1, min(int(lasting / least), MOST_INSTANTS, len(inner)))
         h = lasting / count
         instants: Real = kin.time_step / 2 + h * (np.arange(count, dtype=np.float64) + 0.5)
         nearest = np.abs(instants[:, None] - kin.time_step * inner).argmin(axis=0)

@@ -21,8 +21,8 @@ _WIDTH = 0.25
 """Decibels before its SNR over which a step of a radio's own rates rises in a bound. Chosen."""
 
 
-_GAINS, _KNOWN_GAINS = 2_000, 300
-"""Gains at which rates are tabulated, and those with a draw known for every slot. Chosen."""
+_GAINS = 2_000
+"""Gains at which rates are tabulated. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ def best_rates(problem: Problem) -> BestRates:
     gain_logs, values, exact = [], [], True
     for link in links:
         ends = link.gains.extremes(problem.farthest(link))
-        gain_log = np.linspace(*ends, _KNOWN_GAINS if known else _GAINS)
+        gain_log = np.linspace(*ends, _GAINS)
         slots = problem.kinematics.slots if known else 1
         best, is_exact = best_at(problem, link, np.broadcast_to(gain_log, (slots, len(gain_log))))
         # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being

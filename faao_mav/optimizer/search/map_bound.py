@@ -33,8 +33,8 @@ _COARSE_CELLS, _CELLS, _MAPPED_CELLS, _OWN_CELLS = 500, 60_000, 150_000, 20_000
 where every slot has rates of its own. Measured on a site with ridges: 9.8 % above the plan with
 60,000, 8.0 % with 120,000 and 7.6 % with 150,000, in two and a half times the time."""
 
-_COARSE_REACH, _REACH = 5.0, 10.0
-"""Cells that a step reaches in either map, about. Measured on two sites with ridges: with 12 the
+_REACH = 10.0
+"""Cells that a step reaches, about. Measured on two sites with ridges: with 12 the
 bound is 0.2 and 0.4 % higher."""
 
 _APART = np.array([0.02, 0.06, 0.11, 0.18, 0.27, 0.36, 0.47])
@@ -85,11 +85,11 @@ class MapBound:
     """Whether every slot has rates of its own."""
 
     @classmethod
-    def over(cls, problem: Problem, rates: BestRates, cells: int, reach: float) -> "MapBound":
-        """Return the bound of `problem` over about so many cells, and steps of `reach` cells."""
+    def over(cls, problem: Problem, rates: BestRates, cells: int) -> "MapBound":
+        """Return the bound of `problem` over about so many cells."""
         places = np.vstack([places_about(problem, link) for link in problem.links])
         kin, free = problem.kinematics, problem.free_area
-        found = cells_of(kin, places, cells, reach, free)
+        found = cells_of(kin, places, cells, _REACH, free)
         return cls(problem, rates, found, own_rates(problem, rates))
 
     def bound(self, prices: Sequence[float]) -> float:
@@ -253,6 +253,6 @@ def map_bound(problem: Problem, rates: BestRates, *, cells: int | None = None) -
     if cells is None:
         own = own_rates(problem, rates)
         cells = _OWN_CELLS if own else _MAPPED_CELLS if problem.mapped else _CELLS
-    price = best_price(MapBound.over(problem, rates, _COARSE_CELLS, _COARSE_REACH).bound)
+    price = best_price(MapBound.over(problem, rates, _COARSE_CELLS).bound)
     prices = [*(price - _APART), price, *(price + _APART)]
-    return MapBound.over(problem, rates, cells, _REACH).bound(prices)
+    return MapBound.over(problem, rates, cells).bound(prices)

@@ -23,13 +23,11 @@ _ALONG = 1e-12
 """The velocity across a line, in shares of v_max, that counts as none: rounding errors."""
 
 _TURN_SHARE = 0.95
-"""Share of the largest acceleration that turns use; the rest is for meeting the ends. Chosen."""
+"""Share of the largest acceleration that turns use; the rest is for meeting the ends, and for
+rounding to samples. Chosen."""
 
 _PIECES = 8
 """Pieces of constant turn rate: chosen. A Dubins path has three."""
-
-_PIECE_SHARE = 0.98
-"""The same of curves of such pieces; the rest is for rounding to samples. Chosen."""
 
 _TRIES = 8
 """Random turn rates that are begun with at each speed. Chosen: of six random plans that nothing
@@ -261,7 +259,7 @@ def turning_curves(kin: Kinematics, c: float) -> Iterator[Real]:
     speed, start, end = _near_ends(kin, c, time), kin.start_velocity, kin.end_velocity
     width = time[-1] / _PIECES
     turned = np.clip(time[:, None] - width * np.arange(_PIECES), 0.0, width)  # s in each piece
-    most = np.full(_PIECES, _PIECE_SHARE * kin.turning(speed.max()) / speed.max())
+    most = np.full(_PIECES, _TURN_SHARE * kin.turning(speed.max()) / speed.max())
     known = 0.0 if start is None else float(np.arctan2(start[1], start[0]))
     if start is None:
         turned, most = np.column_stack([turned, np.ones(kin.slots)]), np.append(most, 2 * np.pi)

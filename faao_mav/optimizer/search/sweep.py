@@ -21,7 +21,7 @@ CORNER = np.sqrt(0.5)
 _THINNEST = 0.02
 """Least width of the map, in its length: stations and ends may lie on one line. Chosen."""
 
-_MOST_INSTANTS = 100
+MOST_INSTANTS = 100
 """Instants of a flight at most, which limits time and memory. Chosen."""
 
 
@@ -164,7 +164,7 @@ def cells_of(
     extent = np.maximum(high - low, _THINNEST * float((high - low).max()) + 1.0)
     duration = kin.time_step * (kin.slots - 1)
     side = max(
-        float(np.sqrt(extent.prod() / cells)), kin.max_speed * duration / (reach * _MOST_INSTANTS)
+        float(np.sqrt(extent.prod() / cells)), kin.max_speed * duration / (reach * MOST_INSTANTS)
     )
     margin = 0 if free is None else 2  # no obstacle reaches the edge of the map
     axes = [
@@ -175,7 +175,7 @@ def cells_of(
     t = kin.time_step * np.arange(kin.slots)
     inner = np.arange(1, kin.slots - 1)
     slots = max(1, round(reach * side / (kin.max_speed * kin.time_step)))
-    blocks = np.array_split(inner, max(1, min(len(inner) // slots, _MOST_INSTANTS)))
+    blocks = np.array_split(inner, max(1, min(len(inner) // slots, MOST_INSTANTS)))
     instants = np.array([t[block].mean() for block in blocks])
     alive = np.ones((len(blocks), *x.shape[1:]), dtype=np.bool_)
     for end, ways in ((kin.start, since), (kin.end, until)):
