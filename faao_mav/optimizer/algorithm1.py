@@ -24,6 +24,7 @@ the line of sight depends on the position (`ula`), H_r is constant within (27), 
 recomputed after it.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -35,9 +36,8 @@ import scipy.sparse as sp
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer.design import Link
-from faao_mav.optimizer.kinematics import LENGTH, Trajectory
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.precoder import SCHEMES
@@ -63,6 +63,17 @@ What is left of rounding errors, which differ from processor to processor, chang
 solver's iterations, and its solution by up to 1e-3 m. Chosen: no decrease below `_MIN_DECREASE`
 hangs on more.
 """
+
+# The variables are scaled here already: Clarabel's own equilibration of the many exponential
+# cones more often stalls it than helps. Where it does stall, shorter steps mostly get through.
+_ATTEMPTS: tuple[dict[str, Any], ...] = (
+    {"equilibrate_enable": False},
+    {"equilibrate_enable": False, "max_step_fraction": 0.8},
+    {"equilibrate_enable": True, "max_step_fraction": 0.6},
+)
+
+# A gap of 1e-4 is good enough to go on from; a limit broken by more than 1e-7 is not.
+_REDUCED = {"reduced_tol_gap_abs": 1e-4, "reduced_tol_gap_rel": 1e-4, "reduced_tol_feas": 1e-7}
 
 Point = TypeVar("Point")
 
@@ -191,17 +202,20 @@ def optimize_trajectory(
     The objective is xi, which never increases; its floor is the xi of two links without errors.
     Raises `SolverError` where Clarabel fails.
     """
-    floor = max(-s.offset for s in sums)
+    kin, floor = problem.kinematics, max(-s.offset for s in sums)
 
     def solved(last: Trajectory, gap: float) -> Trajectory:
         """Solve (27) about the flight `last`, with (xi - floor) / gap as the objective."""
-        flight, objective = flight_variables(problem.kinematics), cp.Variable()
+        flight, objective = flight_variables(kin), cp.Variable()
         constraints: list[Any] = list(flight.constraints)
         for s in sums:
             sum_lb, quadratic = convex_bound(s, last.w, flight.w, gap)
             constraints += [quadratic, sum_lb - (s.offset + floor) / gap <= objective]
         minimize(objective, constraints)
-        return flight.trajectory()
+        first = kin.start_velocity
+        if first is None:
+            first = np.asarray(flight.v.value)[0] * kin.max_speed
+        return kin.integrate(first, np.asarray(flight.a.value) * kin.max_acceleration)
 
     return _successively(
         flight,
@@ -325,3 +339,69 @@ def _successively(
         if decrease <= _MIN_DECREASE * gap:
             break
     return point
+
+
+@dataclass(frozen=True, slots=True)
+class FlightVariables:
+    """w, v, a (n, 2) of (11)-(13f), with their constraints: in about 100 m, v_max and a_max.
+
+    With metres as the unit Clarabel fails on (27).
+    """
+
+    w: cp.Variable
+    v: cp.Variable
+    a: cp.Variable
+    constraints: list[Any]
+
+
+def flight_variables(kin: Kinematics) -> FlightVariables:
+    """Return new variables under (11), (12), (13d)-(13f)."""
+    n, dt = kin.slots, kin.time_step
+    w, v, a = (cp.Variable((n, 2)) for _ in range(3))
+    advance = kin.max_speed * dt / LENGTH
+    bend = kin.max_acceleration * dt**2 / 2 / LENGTH
+    gain = kin.max_acceleration * dt / kin.max_speed
+    constraints = [
+        w[1:] == w[:-1] + advance * v[:-1] + bend * a[:-1],
+        v[1:] == v[:-1] + gain * a[:-1],
+        w[0] == kin.start / LENGTH,
+        w[-1] == kin.end / LENGTH,
+        cp.norm(v, axis=1) <= 1,
+        cp.norm(a[kin.first_bounded_acceleration :], axis=1) <= 1,
+        a[-1] == 0,
+    ]
+    if np.isfinite(kin.max_airspeed):
+        wind = np.array(kin.wind) / kin.max_speed
+        constraints.append(cp.norm(v - wind, axis=1) <= kin.max_airspeed / kin.max_speed)
+    if kin.start_velocity is not None:
+        constraints.append(v[0] == kin.start_velocity / kin.max_speed)
+    if kin.end_velocity is not None:
+        constraints.append(v[-1] == kin.end_velocity / kin.max_speed)
+    return FlightVariables(w, v, a, constraints)
+
+
+def minimize(objective: cp.Expression, constraints: list[Any]) -> cp.Problem:
+    """Return the problem of the least `objective`, solved by Clarabel.
+
+    Raises `SolverError` where all attempts fail, or where it finds the problem infeasible: flights
+    that are solved about satisfy it.
+    """
+    problem = cp.Problem(cp.Minimize(objective), constraints)
+    for attempt in _ATTEMPTS:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Solution may be inaccurate")
+            try:
+                problem.solve(
+                    solver=cp.CLARABEL,
+                    ignore_dpp=True,
+                    canon_backend=cp.SCIPY_CANON_BACKEND,
+                    **attempt,
+                    **_REDUCED,
+                )
+            except cp.error.SolverError:
+                continue
+        if problem.status in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+            return problem
+        if problem.status in (cp.INFEASIBLE, cp.INFEASIBLE_INACCURATE):
+            raise SolverError("Clarabel calls a convex problem infeasible that has a solution")
+    raise SolverError("Clarabel made no progress on a convex problem")

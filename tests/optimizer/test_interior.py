@@ -11,13 +11,13 @@ import pytest
 from scipy.linalg import block_diag
 
 from faao_mav.arrays import Real
+from faao_mav.optimizer.algorithm1 import FlightVariables, flight_variables, minimize
 from faao_mav.optimizer.interior.constraint import A, Constraint, Grid, Rows, V, W
 from faao_mav.optimizer.interior.limits import Disc, EnergyLimit, SpeedChange, TurnRate
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.interior.newton import Chain
 from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
-from faao_mav.optimizer.scaled import FlightVariables, flight_variables, minimize
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.power import FixedWing, RotaryWing
 from faao_mav.radio.relay import RelayQueue

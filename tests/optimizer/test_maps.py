@@ -83,7 +83,7 @@ def test_a_sweep_is_the_best_of_all_paths(small_plan: MakePlan, kind: str) -> No
         0, 2, (2, count, *cells.x.shape[1:])
     )
     steps = Steps.over(np.ones(cells.x.shape[1:], dtype=np.bool_), disc(1.5, 0))
-    sweep = QueueSweep.of(cells, rates, 400, steps, relay, kin.time_step)
+    sweep = QueueSweep(cells, rates, 400, steps, relay, kin.time_step)
 
     def worth(places: list[int]) -> float:
         I_U, I_G = rates.reshape(2, count, -1)[:, range(count), places]

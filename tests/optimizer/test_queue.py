@@ -11,12 +11,12 @@ from test_interior import ACTIVE, HEIGHT, STATIONS, copter, links, plane, worst
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
+from faao_mav.optimizer.algorithm1 import flight_variables, minimize
 from faao_mav.optimizer.interior.maximize import maximize, objective
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import fresh_rates, price, saturation
 from faao_mav.optimizer.problem import build_problem
-from faao_mav.optimizer.scaled import flight_variables, minimize
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.solution import load_solution, save_solution

@@ -8,7 +8,6 @@ of what the relay receives, no flight exceeds the largest sum of lambda I_U + (1
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -45,81 +44,45 @@ _BEHIND, _BEFORE = 0.15, 0.55
 same plan: with 0.25 and 0.75 the bound is 0.3 % higher."""
 
 
-@dataclass(frozen=True)
 class AxisBound:
     """Cells of place and speed along the axis through the stations, at K instants of a flight.
 
     a_max crosses `speeds` cells of the speed between two instants. Row i of the cells is at the
-    place `low` + i `side`, column j at the speed j `gap`, from -v_max to v_max. With `side` = `gap`
-    h / 2 a step of h seconds from column i to column j goes i + j rows, and as far to either side
-    as the acceleration lets it. The first and the last row stand for all places beyond. Flights are
-    of `parts` kinds by where they pass across the axis.
+    place `x`[i], `side` m apart, column j at the speed `gap` `columns`[j], m/s, from -v_max to
+    v_max. With `side` = `gap` h / 2 a step of h seconds from column i to column j goes i + j rows,
+    and as far to either side as the acceleration lets it. The first and the last row stand for all
+    places beyond. Flights are of `parts` kinds by where they pass across the axis, which no slot is
+    nearer to than `across` (n,), m. Start, end and stations are at `places` (2, 4), m, along and
+    across it. Instants are at `t` (K,), s, and stand for the slots `blocks`.
     """
 
-    problem: Problem
-    rates: BestRates
-    speeds: int
-    parts: int = 1
+    def __init__(self, problem: Problem, rates: BestRates, speeds: int, parts: int = 1) -> None:
+        self.problem, self.rates, self.speeds, self.parts = problem, rates, speeds, parts
+        kin, (first, second) = problem.kinematics, (link.gains.station for link in problem.links)
+        apart = float(np.hypot(*(second - first)))
+        self.axis = (second - first) / apart if apart > 0 else np.array([1.0, 0.0])
+        turned = np.stack([self.axis, [-self.axis[1], self.axis[0]]])
+        self.places = turned @ (np.array([kin.start, kin.end, first, second]) - first).T
+        low, high = self.places[0].min() - _BEYOND, self.places[0].max() + _BEYOND
 
-    @cached_property
-    def times(self) -> tuple[Real, float, list[Integers]]:
-        """The instants (K,), s, the time h between them, and the slots nearest to each of them."""
-        kin = self.problem.kinematics
         inner = np.arange(1, kin.slots - 1)
         lasting = kin.time_step * len(inner)
-        extent = float(np.ptp(self.places[0])) + 2 * _BEYOND
-        crossed = 4 * self.speeds**2 * kin.max_speed * extent / kin.max_acceleration**2
+        crossed = 4 * speeds**2 * kin.max_speed * (high - low) / kin.max_acceleration**2
         least = max(_INTERVAL, (crossed / _MOST_CELLS) ** (1 / 3))
         count = max(1, min(int(lasting / least), MOST_INSTANTS, len(inner)))
-        h = lasting / count
-        instants: Real = kin.time_step / 2 + h * (np.arange(count, dtype=np.float64) + 0.5)
-        nearest = np.abs(instants[:, None] - kin.time_step * inner).argmin(axis=0)
-        return instants, h, [inner[nearest == k] for k in range(count)]
+        self.h = h = lasting / count
+        self.t: Real = kin.time_step / 2 + h * (np.arange(count, dtype=np.float64) + 0.5)
+        nearest = np.abs(self.t[:, None] - kin.time_step * inner).argmin(axis=0)
+        self.blocks = [inner[nearest == k] for k in range(count)]
 
-    @cached_property
-    def gap(self) -> float:
-        """Width of the cells of the speed, m/s."""
-        return self.problem.kinematics.max_acceleration * self.times[1] / self.speeds
-
-    @cached_property
-    def side(self) -> float:
-        """Width of the cells of the place, m."""
-        return self.gap * self.times[1] / 2
-
-    @cached_property
-    def columns(self) -> Integers:
-        """The speeds of the cells, in widths."""
-        most = int(np.ceil(self.problem.kinematics.max_speed / self.gap))
-        return np.arange(-most, most + 1)
-
-    @cached_property
-    def axis(self) -> Real:
-        """The direction (2,) from the first station to the second."""
-        first, second = (link.gains.station for link in self.problem.links)
-        apart = float(np.hypot(*(second - first)))
-        return np.asarray((second - first) / apart if apart > 0 else np.array([1.0, 0.0]))
-
-    @cached_property
-    def places(self) -> tuple[Real, Real]:
-        """Start, end and both stations along and across the axis, (4,) each, m."""
-        kin, stations = self.problem.kinematics, [link.gains.station for link in self.problem.links]
-        c, s = self.axis
-        x, y = (np.array([kin.start, kin.end, *stations]) - stations[0]).T
-        return c * x + s * y, c * y - s * x
-
-    @cached_property
-    def x(self) -> Real:
-        """The places of the cells along the axis, m."""
-        low, high = self.places[0].min() - _BEYOND, self.places[0].max() + _BEYOND
-        return np.asarray(low + self.side * np.arange(int((high - low) / self.side) + 2))
-
-    @cached_property
-    def across(self) -> Real:
-        """The least distance from the axis that each slot can have (n,), m."""
-        ways = np.array(self.problem.kinematics.longest_ways())
-        ends = self.places[1][:2, None]
-        low, high = (ends - ways).max(axis=0), (ends + ways).min(axis=0)
-        return np.asarray(np.maximum(0.0, np.maximum(low, -high)))
+        self.gap = kin.max_acceleration * h / speeds
+        self.side = self.gap * h / 2
+        most = int(np.ceil(kin.max_speed / self.gap))
+        self.columns: Integers = np.arange(-most, most + 1)
+        self.x: Real = low + self.side * np.arange(int((high - low) / self.side) + 2)
+        ways, ends = np.array(kin.longest_ways()), self.places[1][:2, None]
+        beyond = np.maximum((ends - ways).max(axis=0), -(ends + ways).min(axis=0))
+        self.across: Real = np.maximum(0.0, beyond)
 
     @cached_property
     def passed(self) -> tuple[float, list[Real]]:
@@ -155,7 +118,7 @@ class AxisBound:
         At a change d of the speed the way in h is the mean speed times h, give or take
         a_max h² / 4 (1 - (d / (a_max h))²).
         """
-        h, gain = self.times[1], self.problem.kinematics.max_acceleration * self.times[1]
+        h, gain = self.h, self.problem.kinematics.max_acceleration * self.h
         found = []
         for change in range(-self.speeds - 1, self.speeds + 2):
             least = max(0, abs(change) - 1) * self.gap
@@ -169,12 +132,12 @@ class AxisBound:
 
         At `prices` (B,), with flights that come as near to the axis as `across` (parts, n), m.
         """
-        kin, (instants, _, blocks) = self.problem.kinematics, self.times
+        kin = self.problem.kinematics
         speed, rows = self.gap * self.columns, len(self.x)
         found = np.zeros((2, len(across), 1, len(speed), rows))
         part = self.side / PARTS
-        for slot in blocks[k].tolist():
-            tau = slot * kin.time_step - float(instants[k])
+        for slot in self.blocks[k].tolist():
+            tau = slot * kin.time_step - float(self.t[k])
             off = (self.side + part + self.gap * abs(tau) + kin.max_acceleration * tau**2) / 2
             shifts = np.rint(speed * tau / part).astype(np.intp)
             most = int(np.abs(shifts).max())
@@ -196,7 +159,7 @@ class AxisBound:
 
     def _alive(self, k: int) -> Flags:
         """Return whether a flight can be in each cell (columns, rows) at instant k."""
-        kin, t = self.problem.kinematics, float(self.times[0][k])
+        kin, t = self.problem.kinematics, float(self.t[k])
         speed = self.gap * self.columns[:, None]
         left = kin.time_step * (kin.slots - 1) - t
         alive = np.ones((len(speed), len(self.x)), dtype=np.bool_)
@@ -259,7 +222,7 @@ class AxisBound:
         Through each cell half-way a flight is worth no more than at any of the prices.
         """
         p = np.clip(np.array(prices), 0.0, 1.0)
-        count = len(self.times[0])
+        count = len(self.t)
         before = self._since(range(count // 2 + 1), 0, p)
         if count > count // 2 + 1:
             before += self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
@@ -275,7 +238,7 @@ class AxisBound:
         kin, when, parts = self.problem.kinematics, *self.passed
         values: Real | None = None
         for k in order:
-            t = float(self.times[0][k])
+            t = float(self.t[k])
             since = kin.time_step * (kin.slots - 1) - t if end else t
             across = parts[end] if since < _MERGED * when else self.across[None]
             worth = self.rewards(k, prices, across)

@@ -183,7 +183,7 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
     rates = np.stack([each.value(found.x[..., None])[..., 0] for each in fields], axis=1)
     counts = np.array([len(block) for block in found.blocks])
     step = kin.max_speed * float(np.diff(found.instants).max(initial=0.0)) / found.side
-    return QueueSweep.of(
+    return QueueSweep(
         found,
         counts[:, None, None] * rates,
         _LEVELS,

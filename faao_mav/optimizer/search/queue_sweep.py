@@ -5,7 +5,6 @@ proportion. Of all that the cells in reach have of the level that is left the be
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,44 +22,29 @@ _LEAST = 1e-9
 """Bits of the queue's highest level at least: there are levels where nothing is received."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class QueueSweep:
     """Best paths by place and level: `rates` (2, K, i, j) of both hops over `cells`, bits.
 
-    They are those of all slots of an instant together. `levels` (L,) are even, bits per hertz and
-    slot; below 0, without a queue, more has been sent than was received. `steps` lead from
-    cell to cell.
+    They are those of all slots of an instant together; `steps` lead from cell to cell. There are so
+    many even `levels`, bits per hertz and slot; below 0, for R_avg without a `relay`, more has been
+    sent than was received.
     """
 
-    cells: Cells
-    rates: Real
-    levels: Real
-    steps: Steps
-    half: bool
-    queued: bool
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         cells: Cells,
         rates: Real,
         levels: int,
         steps: Steps,
         relay: RelayQueue | None,
         time_step: float,
-    ) -> "QueueSweep":
-        """Return the sweep with so many `levels`, for R_avg without a `relay`."""
+    ) -> None:
+        self.cells, self.rates, self.steps = cells, rates, steps
+        self.queued, self.half = relay is not None, relay is not None and relay.half
         come, gone = rates.max(axis=(2, 3)).sum(axis=1)
         most = come * gone / max(come + gone, _LEAST)  # what is received first and then sent
         most = max(_LEAST, min(most, np.inf if relay is None else relay.buffer / time_step))
-        return cls(
-            cells,
-            rates,
-            np.linspace(-most if relay is None else 0.0, most, levels),
-            steps,
-            relay is not None and relay.half,
-            relay is not None,
-        )
+        self.levels: Real = np.linspace(-most if relay is None else 0.0, most, levels)
 
     def path(self) -> Real:
         """Return the best path, the places (K, 2) at the instants, m."""
