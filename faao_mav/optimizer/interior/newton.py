@@ -186,9 +186,14 @@ class System:
             slopes[part.rows.start - first : part.rows.stop - first, part.places] = each.slope
         return Functions(x, rows, values - self.inside, slopes * self.free)
 
-    def spread(self, z: Real) -> Real:
-        """Return z (m,) as those of all rows in all slots, those of sums the same in each."""
+    def spread(self, z: Real, reward: float = 1.0) -> Real:
+        """Return z (m,) as those of all rows in all slots, those of sums the same in each.
+
+        A goal that is one `reward` has that multiplier.
+        """
         rows = np.zeros(self.on.shape)
+        if not self.goal.own:
+            rows[self.parts[self._of_goal].rows] = reward
         rows[self.on] = z[: self.first_sum]
         sums = np.outer(z[self.first_sum :], np.ones(self.on.shape[-1]))
         return np.concatenate([rows, sums])
@@ -209,7 +214,7 @@ class System:
 
     def stiffness(self, at: Functions, weights: Real) -> Real:
         """Return J^T diag(`weights`) J of the inequalities in slots, (k, k, n)."""
-        stiff = self.spread(weights)
+        stiff = self.spread(weights, 0.0)
         found = np.zeros((len(at.x), *at.x.shape))
         for part, rows in self._in_slots(at):
             J = rows.slope
@@ -226,6 +231,15 @@ class System:
                 block = np.einsum("mn,mijn->ijn", weights[part.rows], rows.bend)
                 found[np.ix_(part.places, part.places)] -= block
         return found
+
+    def reward(self, at: Functions, along: Real | None = None) -> float:
+        """Return the goal where it is one reward, or how it changes `along` dx (k, n); else 0."""
+        rows = at.rows[self._of_goal]
+        if self.goal.own:
+            return 0.0
+        if along is None:
+            return float(rows.value.sum())
+        return float(np.einsum("min,in->", rows.slope, along[: len(W)]))
 
     def steepness(self, at: Functions, z: Real) -> float:
         """Return the largest gradient of what the goal has of w, weighted by z."""

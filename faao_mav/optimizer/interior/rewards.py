@@ -77,8 +77,9 @@ class Goal(Constraint):
     earlier slot. In slot 0 nothing can be forwarded, and what the last receives is worth nothing.
     For min(R_U, R_G), without a relay, more may be forwarded than was received before, not in all.
 
-    Beside `of` it has the unknowns r, f, q and x of each slot, of one reward r alone. The
-    objective is `slope` times these (own,); they keep `after` x_{n+1} = `before` x_n, (k, own).
+    Beside `of` it has the unknowns r, f, q and x of each slot. The objective is `slope` times these
+    (own,); they keep `after` x_{n+1} = `before` x_n, (k, own). Of one reward there are none: its
+    row is no inequality, but the objective.
     """
 
     of = W
@@ -90,17 +91,17 @@ class Goal(Constraint):
         self.causal, self.half = relay is not None, relay is not None and relay.half
         self.buffer = math.inf if relay is None else relay.buffer / time_step / rewards.unit
         hops = len(rewards.base)
-        self.own = own = 1 if hops == 1 else 4 if self.half else 3
+        self.own = own = 0 if hops == 1 else 4 if self.half else 3
         self.held = (3,) if self.half else ()
-        self.slope = np.eye(own)[hops - 1]
+        self.slope = np.array([0.0, 1.0, 0.0, 0.0])[:own]
         self.before = np.array([[1.0, -1.0, 1.0, 0.0]])[: hops - 1, :own]
         self.after = np.array([[0.0, 0.0, 1.0, 0.0]])[: hops - 1, :own]
 
     def begin(self, *, cold: bool) -> Real:
         """Return its unknowns (own, n) to begin with: what is forwarded greedily."""
         rates = self.rewards.base / self.rewards.unit
-        if self.own == 1:
-            return rates
+        if self.own == 0:
+            return rates[:0]
         I_U, I_G = rates
         n, x = len(I_U), np.full(len(I_U), 0.5)
         if not self.causal:
@@ -126,17 +127,17 @@ class Goal(Constraint):
         own, n = x[2:], x.shape[1]
         rates, gradient, hessian = self.rewards.scaled(x[:2])
         hops, half = len(rates), self.half
-        shares = np.stack([own[3], 1 - own[3]]) if half else np.ones((hops, n))
+        if hops == 1:
+            return Rows(rates, gradient, hessian)
+        shares = np.stack([own[3], 1 - own[3]]) if half else np.ones((2, n))
         slope = np.zeros((6, 2 + self.own, n))
         bend = np.zeros((6, 2 + self.own, 2 + self.own, n))
-        slope[:hops, :2] = shares[:, None] * gradient
-        bend[:hops, :2, :2] = shares[:, None, None] * hessian
-        value = [*(shares * rates - own[:hops])]
-        slope[range(hops), range(2, 2 + hops)] = -1
-        if hops == 2:
-            come = 0.0 if self.causal else 1.0
-            value.append(own[2] - own[1] + come * own[0])
-            slope[2, 2:5] = np.array([[come], [-1.0], [1.0]])
+        slope[:2, :2] = shares[:, None] * gradient
+        bend[:2, :2, :2] = shares[:, None, None] * hessian
+        come = 0.0 if self.causal else 1.0
+        value = [*(shares * rates - own[:2]), own[2] - own[1] + come * own[0]]
+        slope[0, 2] = slope[1, 3] = -1
+        slope[2, 2:5] = np.array([[come], [-1.0], [1.0]])
         if math.isfinite(self.buffer):
             slope[len(value), 4] = -1
             value.append(self.buffer - own[2])
@@ -151,7 +152,7 @@ class Goal(Constraint):
 
     def on(self, grid: Grid, rows: int) -> Flags:
         """Return where each row holds, (rows, n)."""
-        on = np.ones((rows, grid.slots), dtype=np.bool_)
+        on = np.full((rows, grid.slots), self.own > 0)
         if self.causal:
             on[0, -1] = on[1:3, 0] = False
         else:

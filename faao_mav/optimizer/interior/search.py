@@ -111,7 +111,7 @@ class Search:
         # what is missed in second order counts tenfold
         broken = 10 * float((system.each * np.abs(it.margin)).max())
         broken = max(broken, float(np.abs(system.chain.missed(at.x)).max()))
-        value = float((system.objective * at.x).sum())
+        value = float((system.objective * at.x).sum()) + system.reward(at)
         kept = broken < self.tolerance
         if (kept and value > self.best) or self.best == -np.inf:
             self.best, self.v = value if kept else -np.inf, at.x[list(V)]
@@ -173,7 +173,8 @@ class Search:
         s, z = it.s + share * step.s, it.z + share * step.z
         margin = s - at.values
         more = z * (margin - (1 - share) * it.margin)
-        missing = float(more[~system.turns].sum())
+        missing = float(more[~system.turns].sum()) + share * system.reward(it.at, step.x)
+        missing += system.reward(it.at) - system.reward(at)
         decrease = step.bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
         missing -= share**2 / 2 * step.bend
         if not decrease > 0 or missing > _MISFIT * share * decrease + self.goal.noise:
