@@ -119,7 +119,7 @@ def test_every_step_of_a_flight_is_in_reach_along_the_axis(
     cells, rng = bounded(kind).axis, np.random.default_rng(seed)
     kin = cells.problem.kinematics
     flight = random_flight(kin, seed)
-    instants, _, _ = cells.times
+    instants = cells.t
     n = np.minimum((instants / kin.time_step).astype(int), kin.slots - 2)
     tau = (instants - kin.time_step * n)[:, None]
     first, second = (link.gains.station for link in cells.problem.links)
@@ -183,7 +183,7 @@ def test_several_prices_part_flights_that_never_meet(small_plan: MakePlan, causa
     faint = {"radio.base_station.power_dbm": -20, "radio.relay.power_dbm": -20}
     changes = {"radio.causal": causal, "radio.fading": "none", "radio.gain": {"exponent": 3}}
     problem = build_problem(small_plan(faint | changes))
-    cells = MapBound.over(problem, best_rates(problem), 2000, 6.0)
+    cells = MapBound(problem, best_rates(problem), 2000)
     prices = np.linspace(0, 1, 21).tolist()
     assert cells.bound(prices) < 0.95 * min(cells.bound([price]) for price in prices)
 

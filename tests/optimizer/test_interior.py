@@ -16,7 +16,7 @@ from faao_mav.optimizer.interior.constraint import A, Constraint, Grid, Rows, V,
 from faao_mav.optimizer.interior.limits import Disc, EnergyLimit, SpeedChange, TurnRate
 from faao_mav.optimizer.interior.maximize import maximize
 from faao_mav.optimizer.interior.newton import Chain
-from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValues
+from faao_mav.optimizer.interior.rewards import Goal, Stage, StageValues
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.power import FixedWing, RotaryWing
@@ -216,7 +216,7 @@ def test_the_sign_of_the_curvature_is_that_of_dense_eigenvalues(kin: Kinematics)
     rng = np.random.default_rng(0)
     grid, n = Grid.of(kin), kin.slots
     free = np.concatenate([grid.free, np.ones((3, n), dtype=np.bool_)])
-    goal = Goal(Rewards(ACTIVE, np.full((2, n), 80.0)), RelayQueue(), kin.time_step)
+    goal = Goal(ACTIVE, np.full((2, n), 80.0), RelayQueue(), kin.time_step)
     chain, kept = Chain(grid, goal, free), free.T.ravel()
     A = np.stack([chain.missed(x.reshape(n, 9).T).T.ravel() for x in np.eye(9 * n)], axis=1)
     A = A[:, kept]
@@ -238,10 +238,10 @@ CONSTRAINTS: list[Constraint] = [
     EnergyLimit(RotaryWing(80.0, 90.0, 120.0, 4.0, 0.01, 20.0), 1e4, plane(20, wind=(1.0, 2.0))),
     EnergyLimit(FixedWing.fitted(90.0, 15.0, 2.5), 1e4, plane(20, wind=(1.0, 2.0))),
     *(
-        Goal(Rewards(ACTIVE, np.full((2, 4), 80.0)), relay, 0.5)
+        Goal(ACTIVE, np.full((2, 4), 80.0), relay, 0.5)
         for relay in (None, RelayQueue(buffer=30.0), RelayQueue(half=True, buffer=30.0))
     ),
-    Goal(Rewards(links(bpsk, 4e4), np.full((2, 4), 80.0)), None, 0.5),
+    Goal(links(bpsk, 4e4), np.full((2, 4), 80.0)),
 ]
 
 

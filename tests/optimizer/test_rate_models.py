@@ -13,8 +13,8 @@ from faao_mav.optimizer.design import Design, Link, design
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
-from faao_mav.optimizer.rates.field import SlotRate, rate_field, rate_models
-from faao_mav.optimizer.rates.table_rate import TableRate
+from faao_mav.optimizer.rates.field import SlotRate, rate_field
+from faao_mav.optimizer.rates.table_rate import TableRate, kind_of, table_rates
 from faao_mav.optimizer.shadowing import outcomes, shadowed, shadows, tolled
 from faao_mav.optimizer.solution import Solution
 
@@ -68,12 +68,18 @@ def test_the_envelope_theorem(small_plan: MakePlan) -> None:
     assert np.linalg.eigvalsh(excess).max() < 1e-5
 
 
+def rate_of(link: Link, wanted: Design) -> RateModel:
+    if not kind_of(link, wanted):
+        return SlotRate(link, wanted)
+    return table_rates([(link, np.array(link.gains.extremes(FARTHEST)))], wanted)[0]
+
+
 def test_tables_of_mutual_information(small_plan: MakePlan) -> None:
     """The curves are smooth, and nowhere above what precoders of the place itself carry."""
     for_it = {"optimizer.rate": "mutual_information", "radio.line_of_sight": "all_ones"}
     plan = small_plan(for_it | {"radio.fading_samples": 2})
     wanted, link = design(plan), build_problem(plan).bs_uav
-    table, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
+    table, w = rate_of(link, wanted), places(link)
     assert isinstance(table, TableRate)
     at = link_coordinates(link, w.T)
     H = link.channel(w)
@@ -124,7 +130,7 @@ def test_models_have_the_rate_of_every_place_and_its_slopes(
         within = 2e-4
         if link.steps is not None:
             link, within = replace(link, steps=link.steps.widened(3.0)), 1e-3
-        rate, w = rate_models([link], wanted, [FARTHEST])[0], places(link)
+        rate, w = rate_of(link, wanted), places(link)
         exact = exactly(link, wanted, w)
         assert value_of(link, rate)(w) == pytest.approx(exact, abs=within)
         if wanted.optimal and link.steps is None:

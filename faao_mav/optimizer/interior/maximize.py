@@ -9,7 +9,7 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import ALLOWED, A, Constraint, V, every_excess, unknowns
 from faao_mav.optimizer.interior.limits import Disc, SpeedChange, TurnRate
-from faao_mav.optimizer.interior.rewards import Goal, Rewards, Stage, StageValues
+from faao_mav.optimizer.interior.rewards import Goal, Stage, StageValues
 from faao_mav.optimizer.interior.search import COLD, SLOW, WARM, Search
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.radio.relay import RelayQueue
@@ -66,14 +66,14 @@ def maximize(
     >>> best.converged, best.trajectory.w[20].round().tolist()
     (True, [50.0, 40.0])
     """
-    rewards = Rewards(stage, start.w.T)
-    first = objective(rewards.base, kin, relay)
-    if rewards.flat:
+    goal = Goal(stage, start.w.T, relay, kin.time_step)
+    first = objective(goal.base, kin, relay)
+    if goal.flat:
         return LocalOptimum(start, first, 0, 0.0, True)
     search = Search(
         kin,
         (*constraints_of(kin), *constraints),
-        Goal(rewards, relay, kin.time_step),
+        goal,
         unknowns(kin, start),
         tolerance=tolerance,
         mu=WARM if warm else SLOW if kin.min_speed > 0 else COLD,
@@ -138,20 +138,6 @@ def feasible(
     return start
 
 
-@dataclass(frozen=True)
-class Closeness:
-    """The reward of being near a path r: -||w_n - r_n||^2 in units of `LENGTH`, r (n, 2) in m."""
-
-    path: Real
-
-    def __call__(self, w: Real) -> StageValues:
-        """Return the rewards at w (2, n), m."""
-        away = (w - self.path.T)[:, None] / LENGTH
-        value = -(away * away).sum(axis=0)
-        hessian = np.reshape((-2.0, 0.0, -2.0), (3, 1, 1)) / LENGTH**2
-        return StageValues(value, -2 * away / LENGTH, np.broadcast_to(hessian, (3, *value.shape)))
-
-
 def nearest_flight(
     kin: Kinematics,
     path: Real,
@@ -165,12 +151,18 @@ def nearest_flight(
     None where none is found that keeps `constraints` too. `start` is any flight of `kin`. With
     `first` the way there ends with a flight that keeps them.
     """
+
+    def closeness(w: Real) -> StageValues:
+        away = (w - path.T)[:, None] / LENGTH
+        value = -(away * away).sum(axis=0)
+        hessian = np.reshape((-2.0, 0.0, -2.0), (3, 1, 1)) / LENGTH**2
+        return StageValues(value, -2 * away / LENGTH, np.broadcast_to(hessian, (3, *value.shape)))
+
     limits = constraints_of(kin)
     for every in (limits, (*limits, *constraints)) if constraints else (limits,):
-        rewards = Rewards(Closeness(path), start.w.T)
-        if rewards.flat:
+        goal = Goal(closeness, start.w.T)
+        if goal.flat:
             continue
-        goal = Goal(rewards, None, kin.time_step)
         search = Search(kin, every, goal, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
         for most in range(1, _MOST_STEPS + 1) if first else (_MOST_STEPS,):
             with np.errstate(all="ignore"):

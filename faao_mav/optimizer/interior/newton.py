@@ -232,14 +232,9 @@ class System:
                 found[np.ix_(part.places, part.places)] -= block
         return found
 
-    def reward(self, at: Functions, along: Real | None = None) -> float:
-        """Return the goal where it is one reward, or how it changes `along` dx (k, n); else 0."""
-        rows = at.rows[self._of_goal]
-        if self.goal.own:
-            return 0.0
-        if along is None:
-            return float(rows.value.sum())
-        return float(np.einsum("min,in->", rows.slope, along[: len(W)]))
+    def reward(self, at: Functions) -> float:
+        """Return the goal where it is one reward, else 0."""
+        return 0.0 if self.goal.own else float(at.rows[self._of_goal].value.sum())
 
     def steepness(self, at: Functions, z: Real) -> float:
         """Return the largest gradient of what the goal has of w, weighted by z."""

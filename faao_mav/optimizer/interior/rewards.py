@@ -37,35 +37,6 @@ class Stage(Protocol):
         """Return the rewards at w (2, ..., n), m; not-a-number where there is none."""
 
 
-class Rewards:
-    """f_j of a `stage` in a `unit`: the largest gradient at the start w (2, n), m.
-
-    `base` are those of the start, `flat` tells that there is no gradient.
-    """
-
-    def __init__(self, stage: Stage, w: Real) -> None:
-        self.stage, values = stage, stage(w)
-        self.base = values.value
-        first = self.base.mean(axis=-1, keepdims=True)
-        steepest = np.abs(values.gradient).max(axis=(0, -1))[:, None] * LENGTH
-        # an F_j far above the least one has no say in the unit
-        above = np.maximum(steepest + first - first.min(axis=0), TINY)
-        unit = float((steepest**2 / above).max())
-        self.flat = not unit > _FLAT * np.abs(first).max()
-        self.unit = 1.0 if self.flat else unit
-        rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1).max()
-        self.noise = 1e-9 + rounding / self.unit
-
-    def scaled(self, w: Real) -> tuple[Real, Real, Real]:
-        """Return the rewards at scaled w (2, n), with derivatives as `Rows` has them."""
-        at = self.stage(w * LENGTH)
-        return (
-            at.value / self.unit,
-            at.gradient.swapaxes(0, 1) * (LENGTH / self.unit),
-            at.hessian[PACKED].transpose(2, 0, 1, 3) * (LENGTH**2 / self.unit),
-        )
-
-
 class Goal(Constraint):
     """What is maximised: the sum of one reward, or of what is forwarded of two rates.
 
@@ -86,11 +57,23 @@ class Goal(Constraint):
     inside = 0.0
     headroom = 20.0  # measured: with 0.1 and with 2 two of 16 planes lose 1 to 3 %
 
-    def __init__(self, rewards: Rewards, relay: RelayQueue | None, time_step: float) -> None:
-        self.rewards, self.noise = rewards, rewards.noise
+    def __init__(
+        self, stage: Stage, w: Real, relay: RelayQueue | None = None, time_step: float = 1.0
+    ) -> None:
+        self.stage, values = stage, stage(w)
+        self.base = values.value
+        first = self.base.mean(axis=-1, keepdims=True)
+        steepest = np.abs(values.gradient).max(axis=(0, -1))[:, None] * LENGTH
+        # an F_j far above the least one has no say in the unit
+        above = np.maximum(steepest + first - first.min(axis=0), TINY)
+        unit = float((steepest**2 / above).max())
+        self.flat = not unit > _FLAT * np.abs(first).max()
+        self.unit = 1.0 if self.flat else unit
+        rounding = 2 * np.finfo(float).eps * np.abs(self.base).sum(axis=-1).max()
+        self.noise = 1e-9 + rounding / self.unit
         self.causal, self.half = relay is not None, relay is not None and relay.half
-        self.buffer = math.inf if relay is None else relay.buffer / time_step / rewards.unit
-        hops = len(rewards.base)
+        self.buffer = math.inf if relay is None else relay.buffer / time_step / self.unit
+        hops = len(self.base)
         self.own = own = 0 if hops == 1 else 4 if self.half else 3
         self.held = (3,) if self.half else ()
         self.slope = np.array([0.0, 1.0, 0.0, 0.0])[:own]
@@ -99,7 +82,7 @@ class Goal(Constraint):
 
     def begin(self, *, cold: bool) -> Real:
         """Return its unknowns (own, n) to begin with: what is forwarded greedily."""
-        rates = self.rewards.base / self.rewards.unit
+        rates = self.base / self.unit
         if self.own == 0:
             return rates[:0]
         I_U, I_G = rates
@@ -125,7 +108,10 @@ class Goal(Constraint):
     def rows(self, x: Real) -> Rows:
         """Return x I_U - r, (1 - x) I_G - f, q - f, and what is left of shares and buffer."""
         own, n = x[2:], x.shape[1]
-        rates, gradient, hessian = self.rewards.scaled(x[:2])
+        at = self.stage(x[:2] * LENGTH)
+        rates = at.value / self.unit
+        gradient = at.gradient.swapaxes(0, 1) * (LENGTH / self.unit)
+        hessian = at.hessian[PACKED].transpose(2, 0, 1, 3) * (LENGTH**2 / self.unit)
         hops, half = len(rates), self.half
         if hops == 1:
             return Rows(rates, gradient, hessian)

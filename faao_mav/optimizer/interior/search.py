@@ -173,8 +173,8 @@ class Search:
         s, z = it.s + share * step.s, it.z + share * step.z
         margin = s - at.values
         more = z * (margin - (1 - share) * it.margin)
-        missing = float(more[~system.turns].sum()) + share * system.reward(it.at, step.x)
-        missing += system.reward(it.at) - system.reward(at)
+        missing = float(more[~system.turns].sum()) + system.reward(it.at) - system.reward(at)
+        missing += share * float((system.pull(it.at, 0 * it.z) * step.x).sum())
         decrease = step.bend + float((it.z / it.s * (step.s + it.margin) ** 2).sum())
         missing -= share**2 / 2 * step.bend
         if not decrease > 0 or missing > _MISFIT * share * decrease + self.goal.noise:

@@ -10,7 +10,7 @@ w_n, with first and second derivatives. A link's rate depends on w through two n
 
 A rate model (``RateModel``) therefore works with l and u, and ``by_position`` carries its
 derivatives over to w by the chain rule; ``field.RateField`` puts both links together. There are
-two, and ``field.rate_models`` is the only place that chooses: ``TableRate``, a spline over l +
+two, and ``field.rate_field`` is the only place that chooses: ``TableRate``, a spline over l +
 shift and a second coordinate, for fading that is none, averaged over, or known per slot with best
 precoders in two modes at most; and else ``SlotRate``, the precoders of every slot, with central
 differences. What counts as the rate (cutoff rate, mutual information) is ``radio.rate``; Gaussian

@@ -1,6 +1,5 @@
 """Both links' rates as functions of the UAV's position: what a flight maximises the means of."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -145,26 +144,15 @@ _LEAST_WIDTH = 4.0
 def rate_field(problem: Problem, design: Design, width: float | None = None) -> RateField:
     """Return the rates of `problem` under `design`, as far as a flight can reach.
 
-    Steps of the radio's own rates rise over `width` dB, by default so wide that there is no flat
-    between them.
+    Of each link it is the quickest exact rate model. Steps of the radio's own rates rise over
+    `width` dB, by default so wide that there is no flat between them.
     """
     links = problem.links
     if isinstance(steps := links[0].steps, RateSteps):
         steps = steps.widened(width or max(steps.gap, _LEAST_WIDTH))
         links = replace(links[0], steps=steps), replace(links[1], steps=steps)
-    return RateField(links, rate_models(links, design, [problem.farthest(link) for link in links]))
-
-
-def rate_models(
-    links: Sequence[Link], design: Design, farthest: Sequence[float]
-) -> tuple[RateModel, ...]:
-    """Return the quickest exact rate model of each of the `links` under `design`.
-
-    `farthest` are the largest horizontal distances from their stations, in metres, that they cover.
-    """
-    spans = [link.gains.extremes(far) for link, far in zip(links, farthest, strict=True)]
-    tabled = [k for k, link in enumerate(links) if kind_of(link, design)]
-    tables = iter(table_rates([(links[k], np.array(spans[k])) for k in tabled], design))
-    return tuple(
-        next(tables) if k in tabled else SlotRate(link, design) for k, link in enumerate(links)
-    )
+    tabled = [link for link in links if kind_of(link, design)]
+    spans = [np.array(link.gains.extremes(problem.farthest(link))) for link in tabled]
+    tables = iter(table_rates(list(zip(tabled, spans, strict=True)), design))
+    rates = (next(tables) if kind_of(link, design) else SlotRate(link, design) for link in links)
+    return RateField(links, tuple(rates))

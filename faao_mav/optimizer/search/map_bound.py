@@ -13,15 +13,13 @@ sweep's value is above every flight.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.best_rates import BestRates
-from faao_mav.optimizer.search.sweep import CORNER, Cells, cells_of, disc, largest_near
+from faao_mav.optimizer.search.sweep import CORNER, cells_of, disc, largest_near
 from faao_mav.radio.gain import PER_DB, GainField
 from faao_mav.radio.gain_map import Grid
 
@@ -74,23 +72,14 @@ def best_price(bound: Callable[[list[float]], float]) -> float:
     return float(found.x)
 
 
-@dataclass(frozen=True)
 class MapBound:
-    """The cells of a problem, and what they are worth at prices."""
+    """About so many `cells` of a map for a problem, and what they are worth at prices."""
 
-    problem: Problem
-    rates: BestRates
-    cells: Cells
-    own: bool
-    """Whether every slot has rates of its own."""
-
-    @classmethod
-    def over(cls, problem: Problem, rates: BestRates, cells: int) -> "MapBound":
-        """Return the bound of `problem` over about so many cells."""
-        places = np.vstack([places_about(problem, link) for link in problem.links])
-        kin, free = problem.kinematics, problem.free_area
-        found = cells_of(kin, places, cells, _REACH, free)
-        return cls(problem, rates, found, own_rates(problem, rates))
+    def __init__(self, problem: Problem, rates: BestRates, cells: int) -> None:
+        self.problem, self.rates, kin = problem, rates, problem.kinematics
+        self.cells = cells_of(kin, places_about(problem), cells, _REACH, problem.free_area)
+        self.own, relay = own_rates(problem, rates), problem.maximised_queue
+        self._half = relay is not None and relay.half
 
     def bound(self, prices: Sequence[float]) -> float:
         """Return what no flight exceeds at the `prices` (B,), bit/s/Hz.
@@ -186,41 +175,36 @@ class MapBound:
         # a run backwards has the same rates, unless a station moves
         return (velocities if self.own else velocities[len(velocities) // 2 :]), gap
 
-    @property
-    def _half(self) -> bool:
-        queue = self.problem.maximised_queue
-        return queue is not None and queue.half
-
 
 def own_rates(problem: Problem, rates: BestRates) -> bool:
     """Return whether every slot has rates of its own: by known draws, or by stations that move."""
     return rates.known or any(link.gains.station.ndim > 1 for link in problem.links)
 
 
-def places_about(problem: Problem, link: Link) -> Real:
-    """Return places (k, 2), m: beyond a box about them and the ends the gain only falls outwards.
+def places_about(problem: Problem) -> Real:
+    """Return places (k, 2), m: beyond a box about them and the ends all gains only fall outwards.
 
-    They are the station, as far about it as the gain by its law rises with the distance, and the
-    corners of a map; what no flight can reach of them is drawn nearer.
+    They are the stations, as far about them as the gain by its law rises with the distance, and the
+    corners of maps; what no flight can reach of them is drawn nearer.
     """
-    kin, field = problem.kinematics, link.gains
-    turns = field.law.turns(problem.farthest(link), field.height)
-    gains = field.most_between(turns, turns)
-    rising = turns[-1] if gains[-1] > gains[-2] else turns[-2]
-    found = field.station.reshape(-1, 2)
-    if rising > 0:
-        found = np.concatenate([found - rising, found + rising])
-    if isinstance(field.above, Grid):
-        corners = np.array([[side[0], side[-1]] for side in (field.above.x, field.above.y)])
-        found = np.concatenate([found, corners.T])
-    elif rising == 0:
-        return found
+    kin, places = problem.kinematics, list[Real]()
     apart, way = np.abs(kin.end - kin.start), float(kin.longest_ways()[0][-1])
-    middle, half = (
-        (kin.start + kin.end) / 2,
-        np.sqrt(np.maximum(0.0, way**2 - apart[::-1] ** 2)) / 2,
-    )
-    return np.asarray(np.clip(found, middle - half, middle + half))
+    half = np.sqrt(np.maximum(0.0, way**2 - apart[::-1] ** 2)) / 2
+    middle = (kin.start + kin.end) / 2
+    for link in problem.links:
+        field, found = link.gains, link.gains.station.reshape(-1, 2)
+        turns = field.law.turns(problem.farthest(link), field.height)
+        gains = field.most_between(turns, turns)
+        rising = turns[-1] if gains[-1] > gains[-2] else turns[-2]
+        if rising > 0:
+            found = np.concatenate([found - rising, found + rising])
+        if isinstance(field.above, Grid):
+            corners = np.array([[side[0], side[-1]] for side in (field.above.x, field.above.y)])
+            found = np.concatenate([found, corners.T])
+        if isinstance(field.above, Grid) or rising > 0:
+            found = np.clip(found, middle - half, middle + half)
+        places.append(found)
+    return np.vstack(places)
 
 
 def most_gain(field: GainField, axes: Sequence[Real], off: float) -> Real:
@@ -253,6 +237,6 @@ def map_bound(problem: Problem, rates: BestRates, *, cells: int | None = None) -
     if cells is None:
         own = own_rates(problem, rates)
         cells = _OWN_CELLS if own else _MAPPED_CELLS if problem.mapped else _CELLS
-    price = best_price(MapBound.over(problem, rates, _COARSE_CELLS).bound)
+    price = best_price(MapBound(problem, rates, _COARSE_CELLS).bound)
     prices = [*(price - _APART), price, *(price + _APART)]
-    return MapBound.over(problem, rates, cells).bound(prices)
+    return MapBound(problem, rates, cells).bound(prices)

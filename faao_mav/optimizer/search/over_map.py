@@ -161,7 +161,7 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         first, second = (replace(link, nlos=None) for link in problem.links)
         still = replace(problem, bs_uav=first, uav_user=second)
         field = rate_field(still, design(problem.plan, problem.precoder))
-    places = np.vstack([places_about(problem, link) for link in problem.links])
+    places = places_about(problem)
     if problem.free_area is not None:
         slot = kin.max_speed * kin.time_step / _FARTHEST
         cells = max(1, round(cells * min(1.0, _side(problem, cells) / slot) ** 2))
@@ -244,6 +244,6 @@ def _worth(problem: Problem, field: RateField, flight: Trajectory) -> float:
 
 def _side(problem: Problem, cells: int) -> float:
     """Return the side of so many `cells` over all that matters to the gains, m."""
-    places = [places_about(problem, link) for link in problem.links]
-    extent = np.ptp(np.vstack([*places, problem.kinematics.start, problem.kinematics.end]), axis=0)
+    ends = problem.kinematics.start, problem.kinematics.end
+    extent = np.ptp(np.vstack([places_about(problem), *ends]), axis=0)
     return max(1.0, float(np.sqrt(extent.prod() / cells)))
