@@ -158,10 +158,8 @@ class Kinematics:
         """
         wind, lasting = np.array(self.wind), self.time_step * (self.slots - 1)
         ahead = min(0.75, math.hypot(*wind) / self.min_speed) if self.min_speed > 0 else 0.75
-
-        start, end = (
-            None if v is None else v - wind for v in (self.start_velocity, self.end_velocity)
-        )
+        ends = self.start_velocity, self.end_velocity
+        start, end = (None if v is None else v - wind for v in ends)
         return replace(
             self,
             end=self.end - lasting * wind,
@@ -239,11 +237,8 @@ def kinematics(plan: Plan) -> Kinematics:
     flight, vehicle = plan.flight, plan.vehicle
     rates = plan.aircraft.flight_model().speed_rates
     fastest = math.hypot(plan.max_ground_speed, _WIND_IN_TURNS * math.hypot(*plan.wind))
-
-    first, last = (
-        None if velocity is None else np.array(velocity, dtype=float)
-        for velocity in (flight.start_velocity, flight.end_velocity)
-    )
+    ends = flight.start_velocity, flight.end_velocity
+    first, last = (None if v is None else np.array(v, dtype=float) for v in ends)
     return Kinematics(
         start=np.array(flight.start, dtype=float),
         end=np.array(flight.end, dtype=float),

@@ -12,7 +12,6 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.constraint import ALLOWED, every_excess
 from faao_mav.optimizer.interior.maximize import feasible
-from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.over_map import ROUGHLY, flights_over_map, improved_over_map
@@ -66,22 +65,18 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
     kept, slow = problem.constraints(kin), kin.min_speed > 0
     near = None if near is None or near.shape != (kin.slots, 2) else near
     again = None if near is None else kin.follow(near)
-    found = dict[str, Trajectory]()
+    if problem.mapped and (
+        again is None or every_excess(kin, problem.limits(kin), again) > ALLOWED
+    ):
+        again = next(flights_over_map(problem, field, _CELLS), None)
+    if not problem.mapped or again is None:
+        start = next(iter(starts(kin, ("straight",), {}, problem.free_area, kept).values()))
+        again = start if near is None or problem.mapped else feasible(kin, start, near, kept)
     if problem.mapped:
-        if again is None or every_excess(kin, problem.limits(kin), again) > ALLOWED:
-            along = next(flights_over_map(problem, field, _CELLS), None)
-            found = {} if along is None else {"map": along}
-        else:
-            found = {"known": again}
-    if not found:
-        found = starts(kin, ("straight",), {}, problem.free_area, kept)
-    start = next(iter(found.values()))
-    if problem.mapped:
-        best = improved_over_map(problem, field, start, _ITERATIONS, ROUGHLY, most=1).trajectory
+        best = improved_over_map(problem, field, again, _ITERATIONS, ROUGHLY, most=1).trajectory
     else:
-        nearer = start if near is None else feasible(kin, start, near, kept)
-        warm = nearer is not start and not slow
-        best = problem.improved(field, nearer, ROUGH, _ITERATIONS, warm=warm).trajectory
+        warm = again is not start and not slow
+        best = problem.improved(field, again, ROUGH, _ITERATIONS, warm=warm).trajectory
     I_U, I_G = field.value(best.w.T)
     t = np.asarray(kin.time_step * np.arange(kin.slots))
     relayed = problem.relay.relayed(I_U, I_G, kin.time_step)

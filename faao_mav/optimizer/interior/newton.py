@@ -150,7 +150,7 @@ class System:
         self.objective = np.zeros(x.shape)
         self.objective[COMMON:] = goal.slope[:, None] * self.free[COMMON:]
         self.parts, on = list[_Part](), [np.zeros((0, n), dtype=np.bool_)]
-        # each constraint as often as it has inequalities, and in how many slots each of these is
+        # each constraint, the goal first: as often as it has inequalities, of so many slots each
         often, first = list[tuple[Constraint, int, int]](), 0
         for each in sorted((goal, *constraints), key=lambda each: each.total):
             places = [*each.of, *(range(COMMON, len(x)) if each is goal else ())]
@@ -164,7 +164,6 @@ class System:
                 often.append((each, int(on[-1].sum()), 1))
         self.on, self._slotwise = np.concatenate(on), len(on) - 1
         self.first_sum = int(self.on.sum())
-        self._of_goal = next(k for k, part in enumerate(self.parts) if part.constraint is goal)
 
         def of_each(value: Callable[[Constraint, int], float]) -> Real:
             return np.repeat([value(each, s) for each, _, s in often], [k for _, k, _ in often])
@@ -193,7 +192,7 @@ class System:
         """
         rows = np.zeros(self.on.shape)
         if not self.goal.own:
-            rows[self.parts[self._of_goal].rows] = reward
+            rows[self.parts[0].rows] = reward
         rows[self.on] = z[: self.first_sum]
         sums = np.outer(z[self.first_sum :], np.ones(self.on.shape[-1]))
         return np.concatenate([rows, sums])
@@ -234,11 +233,11 @@ class System:
 
     def reward(self, at: Functions) -> float:
         """Return the goal where it is one reward, else 0."""
-        return 0.0 if self.goal.own else float(at.rows[self._of_goal].value.sum())
+        return 0.0 if self.goal.own else float(at.rows[0].value.sum())
 
     def steepness(self, at: Functions, z: Real) -> float:
         """Return the largest gradient of what the goal has of w, weighted by z."""
-        slope, rows = at.rows[self._of_goal].slope[:, :2], self.parts[self._of_goal].rows
+        slope, rows = at.rows[0].slope[:, :2], self.parts[0].rows
         return float((np.abs(slope) * self.spread(z)[rows, None]).sum(axis=0).max())
 
     def bent(self, at: Functions, dx: Real) -> Real:
