@@ -117,7 +117,9 @@ class Problem:
         model, kin = self.plan.power_model, self.kinematics
         if model is None:
             return None
-        return EnergyLimit(model, self.energy, kin).used(flight) + self._radiated(kin)
+        level = ((0, 0), (0, 1))
+        power = model(np.pad(flight.v - kin.wind, level), np.pad(flight.a, level))
+        return kin.time_step * float(power.sum()) + self._radiated(kin)
 
     def energy_limit(self, kin: Kinematics) -> EnergyLimit | None:
         """Return the limit on the energy of flights of `kin`; None where there is none."""

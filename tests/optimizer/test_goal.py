@@ -281,7 +281,7 @@ def test_other_heights_are_refused() -> None:
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Three heights and none between, where that is enough."""
     monkeypatch.setattr("faao_mav.optimizer.optimize._EVENLY", 3)
-    monkeypatch.setattr("faao_mav.optimizer.optimize._REFINED", 0)
+    monkeypatch.setattr("scipy.optimize.minimize_scalar", lambda *_, **__: None)
 
 
 @pytest.mark.usefixtures("few")
