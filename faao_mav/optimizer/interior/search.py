@@ -40,9 +40,11 @@ _FIRST_PROXIMAL, _MORE_PROXIMAL = 1e-3, 8.0
 """The first proximal term, and by how much the next one is larger. Chosen."""
 
 _FALL = 0.2
-"""mu falls to this share when the scaled gradient is below mu, and in the end to this share of the
-tolerance, by the complementarity gap per slot. Measured on nine random plans with a
+"""mu falls to this share when the scaled gradient is below mu. Measured on nine random plans with a
 least speed: where it has to be below 3 or 10 mu, one or four do not converge."""
+
+_LEAST_GAP = 0.25
+"""The complementarity gap per slot at the least mu, in tolerances. Chosen."""
 
 _MOST_MISSED = 0.2
 """What a step may miss of a limit in second order, where its slack is less. Without it two of 31
@@ -55,8 +57,10 @@ where an obstacle's nearest side changes, g may be below 0 after a step that end
 
 COLD, SLOW, WARM = 10.0, 0.1, 1e-2
 """The first barrier parameter mu of any start, from which the optimum may be far away; of one with
-a least speed, where what turns where is not to be forgotten; and of one that is nearly optimal,
-which has this share of the `headroom` too."""
+a least speed, where what turns where is not to be forgotten; and of one that is nearly optimal."""
+
+_WARM_ROOM = 0.03
+"""The share of the `headroom` that nearly optimal starts are given. Chosen."""
 
 
 class Search:
@@ -81,7 +85,7 @@ class Search:
         x = np.concatenate([x, goal.begin(cold=mu > WARM)])
         self.system = system = System(Grid.of(kin), goal, constraints, x)
         at = system.at(x)
-        s = np.maximum(at.values, (1.0 if mu > WARM else WARM) * system.headroom)
+        s = np.maximum(at.values, (1.0 if mu > WARM else _WARM_ROOM) * system.headroom)
         y = np.zeros((len(system.chain.after), kin.slots - 1))
         self.iterate = Iterate(at, y, s, self.mu / s, s - at.values)
         self.proximal, self.steepness = 0.0, 1.0
@@ -159,7 +163,7 @@ class Search:
         """Lower mu where the scaled gradient `slope` tells that the iterate is near its optimum."""
         solved = slope * self.steepness < self.mu or slope < self.tolerance
         per_slot = len(self.iterate.s) / self.iterate.at.x.shape[1]
-        least = self.tolerance * _FALL * self.steepness / per_slot
+        least = self.tolerance * _LEAST_GAP * self.steepness / per_slot
         self.mu = max(self.mu * (_FALL if solved else 1.0), least)
 
     def _accept(self, step: Direction, share: float) -> bool:
