@@ -15,12 +15,12 @@ from faao_mav.optimizer.interior.maximize import feasible
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.over_map import ROUGHLY, flights_over_map, improved_over_map
-from faao_mav.optimizer.search.starts import ROUGH, starts
+from faao_mav.optimizer.search.starts import starts
 from faao_mav.plan import Plan
 from faao_mav.radio.relay import Relayed
 
-_ITERATIONS = 25
-"""Steps of the search.
+_TOLERANCE, _ITERATIONS = 1e-2, 25
+"""Tolerance, bit/s/Hz, and steps of the search.
 
 Measured with the user dragged by 70 to 100 m: `copter_relay.yaml` 0.14 % below the finished flight,
 `plane_relay.yaml` 0 to 3 % from a finished flight nearby, 22 to 25 % from none.
@@ -76,7 +76,7 @@ def rough_flight(plan: Plan, near: Real | None = None) -> RoughFlight:
         best = improved_over_map(problem, field, again, _ITERATIONS, ROUGHLY, most=1).trajectory
     else:
         warm = again is not start and not slow
-        best = problem.improved(field, again, ROUGH, _ITERATIONS, warm=warm).trajectory
+        best = problem.improved(field, again, _TOLERANCE, _ITERATIONS, warm=warm).trajectory
     I_U, I_G = field.value(best.w.T)
     t = np.asarray(kin.time_step * np.arange(kin.slots))
     relayed = problem.relay.relayed(I_U, I_G, kin.time_step)
