@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("tables", nargs="+", type=Path)
     given = parser.parse_args()
     station = tuple(map(float, given.station.split(",")))
-    flights = [read_measured(path, station).samples for path in given.tables]
+    flights = [read_measured(path, station) for path in given.tables]
     print("left out, law, rms error dB: law, d^-2, law and map; spread told dB")
     rows = []
     for out, flight in enumerate(flights):
@@ -47,8 +47,8 @@ def main() -> None:
         above = found.at(float(np.median(seen.place[:, 2]))) if found else None
         errors.append(errors[0] - (above.value(*seen.place.T[:2]) if above else 0.0))
         rows.append([float(np.sqrt(np.mean(error**2))) for error in errors])
-        law = f"n {fit.exponent:.2f}, {len(fit.elevation)} terms"
-        print(f"{flight.source}: {law}: {told(rows[-1])}; {fit.spread:.2f}")
+        law = f"n {fit.exponent:.2f}, {len(fit.elevation_db)} terms"
+        print(f"{flight.source}: {law}: {told(rows[-1])}; {fit.spread_db:.2f}")
     mean, worst = np.mean(rows, axis=0), np.max(rows, axis=0)
     print(f"mean {told(mean)}; at most {told(worst)}")
 

@@ -15,7 +15,6 @@ from faao_mav.files import check_ending, read_text, write_together
 
 if TYPE_CHECKING:
     from faao_mav.radio.fit import Samples
-    from faao_mav.radio.measured import Calibration, Measured
     from faao_mav.report.link import LinkReport
 
 
@@ -36,48 +35,35 @@ class _Measured:
         "S", "Time over which levels are averaged, s.", min=0.1, max=60.0, default=2.0
     )
 
-    @property
-    def units(self) -> dict[str, str]:
-        """The units of columns by their names."""
-        units: dict[str, str] = {}
-        for each in self.unit or ():
-            column, _, units[column] = each.partition("=")
-            if not units[column]:
-                raise InputError(f"--unit {each}: expected COLUMN=UNIT, as in rssi=dbm")
-        return units
-
-    @property
-    def calibration(self) -> "Calibration":
-        """What a device counts, at which level."""
-        points = [
-            cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
-            for each in self.calibrate or ()
-        ]
-        if len(points) > 2 or len({count for count, *_ in points}) < len(points):
-            raise InputError("--calibrate: expected one or two different counts")
-        return points
-
     def gains(self, path: Path, station: Sequence[float]) -> "Iterator[Samples]":
         """Yield the gain, dB, in each flight of a table or log; without power within a constant."""
         for found in self._flights(path, station):
-            samples, unit = found.samples, found.unit
-            if unit == "mbit/s":
-                samples, unit = self._by_rates(path, samples), "db"
-            if unit == "db" and (self.power is None) != (self.noise is None):
+            if found.unit == "mbit/s":
+                found = self._by_rates(path, found)
+            over_noise = found.unit == "db"
+            if over_noise and (self.power is None) != (self.noise is None):
                 raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
-            floor = self.noise or 0.0 if unit == "db" else 0.0
-            yield replace(samples, level=samples.level + floor - (self.power or 0.0))
+            floor = (self.noise or 0.0) * over_noise
+            yield replace(found, level=found.level + floor - (self.power or 0.0))
 
-    def _flights(self, path: Path, station: Sequence[float]) -> "Iterator[Measured]":
+    def _flights(self, path: Path, station: Sequence[float]) -> "Iterator[Samples]":
         """Yield what was measured in the flights of a table or log."""
         import numpy as np
 
         from faao_mav.fly.logs import read_log
         from faao_mav.radio.measured import measured_in, read_measured
 
-        units, calibration = self.units, self.calibration
+        units = dict(each.partition("=")[::2] for each in self.unit or ())
+        if lacking := [column for column, unit in units.items() if not unit]:
+            raise InputError(f"--unit {lacking[0]}=: expected COLUMN=UNIT, as in rssi=dbm")
+        points = [
+            cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
+            for each in self.calibrate or ()
+        ]
+        if len(points) > 2 or len({count for count, *_ in points}) < len(points):
+            raise InputError("--calibrate: expected one or two different counts")
         if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
-            found = read_measured(path, station, units, calibration)
+            found = read_measured(path, station, units, points)
             if found.left_out:
                 cli.note(f"{path}: {found.left_out} rows without a number are left out")
             yield found
@@ -90,30 +76,28 @@ class _Measured:
         for each in told:
             up = each.altitude - each.home
             rows = np.column_stack([each.t, each.latitude, each.longitude, up, each.rssi])
-            yield measured_in(path, header, rows.tolist(), station, {}, calibration)
+            yield measured_in(path, header, rows.tolist(), station, {}, points)
 
-    def _by_rates(self, path: Path, samples: "Samples") -> "Samples":
+    def _by_rates(self, path: Path, found: "Samples") -> "Samples":
         """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.
 
         What is below the lowest rate or not below the highest may be of any SNR, and is left out.
         """
         import numpy as np
 
-        from faao_mav.plan.reader import MAX_BESIDE, read_rates
+        from faao_mav.plan.reader import MAX_BESIDE, RATES, read_rates
         from faao_mav.radio.rate_steps import RateSteps
 
-        if (rates := self.rates) is None:
+        if self.rates is None:
             raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
-        columns = read_rates(read_text(rates, MAX_BESIDE, "a table", InputError), str(rates))
-        if "mbit_per_s" not in columns:
-            raise InputError(f"{rates}: no column mbit_per_s, which a throughput needs")
-        steps = RateSteps.of(columns["snr_db"], columns["mbit_per_s"])
-        told = np.where(samples.level < steps.most, samples.level, np.nan)
+        text = read_text(self.rates, MAX_BESIDE, "a table", InputError)
+        steps = RateSteps.of(*read_rates(text, str(self.rates), RATES[:1]).values())
+        told = np.where(found.level < steps.most, found.level, np.nan)
         snr = np.interp(told, steps.rates, steps.snr_db, left=np.nan)
-        if lost := int(np.sum(~np.isfinite(snr))):
+        if lost := np.count_nonzero(np.isnan(snr)):
             said = "rows at the least or the greatest rate tell no SNR and are left out"
             cli.note(f"{path}: {lost} {said}")
-        return replace(samples, level=snr)
+        return replace(found, level=snr, unit="db")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import InitVar, dataclass, fields
 from functools import cache, lru_cache
 from pathlib import Path
@@ -30,7 +30,7 @@ _MAX_LINES = 6
 MAX_BESIDE = 250_000
 """Characters of the longest file that a plan names: two of them, indented, fit into its text."""
 
-_RATES = (("snr_db", "mbit_per_s"), ("snr_db", "bit_per_s_per_hz"))
+RATES = (("snr_db", "mbit_per_s"), ("snr_db", "bit_per_s_per_hz"))
 """The columns of a table of rates."""
 
 
@@ -150,10 +150,12 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     return plan
 
 
-def read_rates(text: str, path: str) -> dict[str, list[float]]:
+def read_rates(
+    text: str, path: str, choices: Sequence[tuple[str, ...]] = RATES
+) -> dict[str, list[float]]:
     """Return the columns of a table of rates; raise `PlanError` that names line and value."""
     try:
-        return read_columns(text, _RATES)[1]
+        return read_columns(text, choices)[1]
     except InputError as error:
         raise PlanError(f"{path}: {error}") from None
 

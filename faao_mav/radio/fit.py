@@ -8,7 +8,7 @@ is the spread that is left.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from faao_mav.errors import InputError
 from faao_mav.radio.gain import PathGain
 from faao_mav.vector import lengths
 
-TERMS = 3
+_TERMS = 3
 """Terms of the elevation that a law has at most: of flights at five heights more gain nothing."""
 
 SPREAD_OF_NO_LAW = 10.0
@@ -34,29 +34,21 @@ _TURN, _LEAST, _MOST_LEGS = math.radians(45.0), 10, 100
 """A leg ends where its course has turned by so much, after so many means, or after so many as make
 so many legs. Chosen: each leg is left out once."""
 
-_PACE = 1.0
-"""Metres between two means below which they are a hover's, which has no course. Chosen."""
+_PACE, APART = 1.0, 10.0
+"""Metres between two means below which they are a hover's, which has no course; and between heights
+that are left out one by one. Chosen: twice what a copter holds."""
 
-APART = 10.0
-"""Metres between heights that are told apart. Chosen: twice what a copter holds."""
-
-_SINES, _POWERS, _SWING = np.linspace(0.0, 1.0, 101)[:, None], np.arange(1, TERMS + 1), 40.0
+_SINES, _SWING, _STEEPEST = np.linspace(0.0, 1.0, 101), 40.0, 10.0
 """Sines from the horizon to the zenith, and dB by which the terms of the elevation may differ
 between them. Chosen: deeper nulls of antennas are no polynomial's, and beyond what was flown one
-may do anything."""
-
-_STEEPEST = 10.0
-"""The greatest exponent of a law, the least being 0: what a plan takes."""
+may do anything. Last the greatest exponent, the least being 0: what a plan takes."""
 
 _PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
-_LAGS, _LENGTHS = np.arange(0.0, 310.0, 10.0), np.geomspace(1.0, 1000.0, 1000)
-"""Bounds, m, of the distances between two places at which residuals are compared, and the lengths
-of correlation that are tried. Chosen."""
-
-_MOST_PAIRED = 2000
-"""Means of a flight that are compared with each other at most, for time and memory. Chosen."""
+_LAGS, _LENGTHS, _MOST_PAIRED = np.arange(0.0, 310.0, 10.0), np.geomspace(1.0, 1000.0, 1000), 2000
+"""Bounds, m, of the distances between two places at which residuals are compared, the lengths of
+correlation that are tried, and means that are compared at most, for time and memory. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +56,8 @@ class Samples:
     """What was measured in a flight: `t` (k,), s, the UAV's `place` (k, 3), m, and `level` (k,).
 
     Places are east, north and up of the station's antenna. The level is the gain, dB, or the gain
-    within a constant, such as a received power, dBm. `source` names the log.
+    within a constant; of a table, its `unit` is `dbm` of received power, `db` of signal to noise,
+    or `mbit/s`, and `left_out` are the rows without a number. `source` names the log.
 
     >>> t = np.arange(0.0, 60.0)
     >>> place = np.stack([10.0 * t, 0.0 * t, 50.0 + 0.0 * t], axis=1)
@@ -77,6 +70,8 @@ class Samples:
     place: Real
     level: Real
     source: str = ""
+    unit: str = "db"
+    left_out: int = 0
 
     def means(self, seconds: float) -> "Samples":
         """Return means over `seconds` of time, of the power and of the place, in flight.
@@ -90,75 +85,125 @@ class Samples:
         rows[:, 4] = 10.0 ** (rows[:, 4] / 10.0)
         group = np.unique(np.floor(rows[:, 0] / seconds), return_inverse=True)[1]
         t, *place, power = (np.bincount(group, x) / np.bincount(group) for x in rows.T)
-        return Samples(t, np.stack(place, axis=1), 10.0 * np.log10(power), self.source)
+        return replace(self, t=t, place=np.stack(place, axis=1), level=10.0 * np.log10(power))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class LinkFit:
     """A law of the path gain with what is known of its errors; see the module for the equation.
 
-    `level` is the gain at 1 m, dB, within the constant of what was measured; `exponent` is n and
-    `elevation` are c_1, c_2, ..., dB. `errors` are one standard error of level, exponent (0 where
-    it is given) and terms, by leaving out legs one by one; `error` is that of the gain where it was
-    flown, dB. `spread` is the rms of measured against fitted, dB, at what was left out of a fit, as
-    is `paper_spread`, that of d^-2; `correlation` is the distance, m, over which the correlation of
-    residuals falls to 1/e. `flights` are the means it rests on; `legs` and `heights` are how many
-    were left out one by one.
+    `reference_gain_db` is the gain at 1 m, within the constant of what was measured; `exponent` is
+    n, `elevation_db` are c_1, c_2, ... `errors` are one standard error of these three (0 of a given
+    exponent), by leaving out legs one by one; `gain_error_db` is that of the gain where it was
+    flown. `spread_db` is the rms of measured against fitted at what was left out of a fit, as is
+    `paper_spread_db`, that of d^-2; `correlation_m` is the distance over which the correlation of
+    residuals falls to 1/e. `elevation_deg` and `distance_m` are the least and the greatest of the
+    `means`; so many `legs` and `heights` were left out one by one. `flown` are the means, `leg`
+    (k,) is the number of each one's leg.
 
-    >>> fit = LinkFit(-48.5, 2.0, (54.48, -75.2), (), 0, 6.2, 7.5, 80.0, 4, 1, ())
-    >>> fit.exponent, fit.spread < fit.paper_spread
-    (2.0, True)
+    >>> t = np.arange(0.0, 200.0)
+    >>> place = np.stack([300.0 * np.cos(t / 9), 8.0 * t - 700.0, 40.0 + 0.2 * t], axis=1)
+    >>> level = -40.0 - 20.0 * np.log10(np.linalg.norm(place, axis=1))
+    >>> fit_link([Samples(t, place, level)], seconds=1.0)
+    <LinkFit: -40.0 - 20 log10 d dB, spread 0.0 dB of 200 means>
     """
 
-    level: float
+    reference_gain_db: float
     exponent: float
-    elevation: tuple[float, ...]
+    elevation_db: tuple[float, ...]
     errors: tuple[float, ...]
-    error: float
-    spread: float
-    paper_spread: float
-    correlation: float
+    gain_error_db: float
+    spread_db: float
+    paper_spread_db: float
+    correlation_m: float
+    elevation_deg: tuple[float, float]
+    distance_m: tuple[float, float]
+    means: int
     legs: int
     heights: int
-    flights: tuple[Samples, ...]
+    flown: Samples
+    leg: Integers
+
+    def __str__(self) -> str:
+        """Return the law as a sum, of d, m, and of s, the sine of the elevation."""
+        text = f"{self.reference_gain_db:.1f} - {10 * self.exponent:.3g} log10 d"
+        for power, term in zip(("", "^2", "^3"), self.elevation_db, strict=False):
+            text += f" {'-' if term < 0 else '+'} {abs(term):.1f} s{power}"
+        return f"{text} dB"
 
     def __repr__(self) -> str:
         """Say what was found, in a line."""
-        terms = ", ".join(f"{term:.1f}" for term in self.elevation)
-        law = f"{self.level:.1f} dB at 1 m, n = {self.exponent:.2f}, elevation [{terms}]"
-        return f"<LinkFit: {law}, spread {self.spread:.1f} dB of {self.count} means>"
-
-    @property
-    def place(self) -> Real:
-        """Where the means were flown, (k, 3), m east, north and up of the antenna."""
-        return np.concatenate([flight.place for flight in self.flights])
-
-    @property
-    def distance_m(self) -> tuple[float, float]:
-        """The least and the greatest distance of the means, m."""
-        d, _ = seen(self.place)
-        return float(d.min()), float(d.max())
-
-    @property
-    def elevation_deg(self) -> tuple[float, float]:
-        """The least and the greatest elevation at which the antenna saw them, degrees."""
-        _, angle = seen(self.place)
-        return float(angle.min()), float(angle.max())
+        return f"<LinkFit: {self}, spread {self.spread_db:.1f} dB of {self.means} means>"
 
     @property
     def holds(self) -> bool:
         """Whether a law of place says anything: what is left is not beyond `SPREAD_OF_NO_LAW`."""
-        return self.spread <= SPREAD_OF_NO_LAW
-
-    @property
-    def count(self) -> int:
-        """The number of means."""
-        return sum(len(flight.t) for flight in self.flights)
+        return self.spread_db <= SPREAD_OF_NO_LAW
 
     def gain_db(self, place: Real) -> Real:
         """Return the fitted level, dB, at `place` (..., 3), m from the station's antenna."""
-        law = PathGain(10.0 ** (self.level / 10.0), self.exponent, self.elevation)
+        law = PathGain(10.0 ** (self.reference_gain_db / 10.0), self.exponent, self.elevation_db)
         return law.db(lengths(place[..., :2]), place[..., 2])
+
+
+def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
+    """Return the law for what was measured in `flights`, by means over `seconds`.
+
+    Of the laws with the exponent 2 or a free one and up to three terms of the elevation it is that
+    with the least rms error at what is left out of the fit: each leg in turn and, where several
+    heights were flown, each height. More parameters have to pay. Least squares are robust (Huber).
+    Raises `InputError` where there are fewer than ten means in flight, or all at one place.
+    """
+    flown = [flight.means(seconds) for flight in flights]
+    t, place, y = (np.concatenate([getattr(f, x) for f in flown]) for x in ("t", "place", "level"))
+    source, counts = ", ".join(dict.fromkeys(f.source for f in flown)), [len(f.t) for f in flown]
+    if len(y) < _LEAST or not all(counts):
+        text = f"{', '.join(map(str, counts))} means over {seconds:g} s in flight"
+        raise InputError(f"{source}: {text}; expected at least {_LEAST}, and some of each")
+    if np.ptp(place, axis=0).max() < 1.0:
+        raise InputError(f"{source}: one place alone; expected a flight")
+    leg = _legs(flown)
+    height = _heights(place[:, 2], leg)
+    d, angle = seen(place)
+    columns = np.vander(place[:, 2] / d, _TERMS + 1, increasing=True)  # 1, s, s², ...
+    columns = np.insert(columns, 1, -10.0 * np.log10(d), axis=1)
+    left_y = y - 2.0 * columns[:, 1]  # that level, n - 2 and terms are to tell, a column each
+    laws = [[0, *free, *range(2, 2 + terms)] for free in ([], [1]) for terms in range(_TERMS + 1)]
+    found: list[tuple[list[int], Real, Real, list[float]]] = []  # each better than those before
+    for law in sorted(laws, key=len) if leg.any() else [[0]]:  # of one leg none can be left out
+        A, c, errors = columns[:, law], np.zeros(2 + _TERMS), []
+        for part in (height, leg):
+            if part.any() or part is leg:
+                each = _robust(A, left_y, part)
+                errors.append(_rms(left_y - np.sum(A * each[part + part.any()], axis=1)))
+        c[law] = each[0]
+        terms = np.polyval([*c[:1:-1], 0.0], _SINES)
+        sound = 0.0 <= 2.0 + c[1] <= _STEEPEST and np.ptp(terms) <= _SWING
+        if not found or (sound and np.mean(errors) < (1.0 - _PAYS) * np.mean(found[-1][3])):
+            found.append((law, c, each[1:], errors))
+    law, c, without, (spread, *_) = found[-1]
+    count, away, used = int(leg[-1]) + 1, np.full((1, len(law)), math.inf), max(law[-1], 1) + 1
+    if count > 1:  # the jackknife
+        away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
+    errors_of = np.zeros_like(c)
+    errors_of[law] = np.linalg.norm(away, axis=0)
+    return LinkFit(
+        reference_gain_db=float(c[0]),
+        exponent=2.0 + float(c[1]),
+        elevation_db=tuple(c[2:used].tolist()),
+        errors=tuple(errors_of[:used].tolist()),
+        gain_error_db=_rms(np.linalg.norm(columns[:, law] @ away.T, axis=1)),
+        spread_db=spread,
+        paper_spread_db=found[0][3][0],
+        correlation_m=_correlation(place, left_y - columns @ c),
+        elevation_deg=(float(angle.min()), float(angle.max())),
+        distance_m=(float(d.min()), float(d.max())),
+        means=len(y),
+        legs=count,
+        heights=int(height.max()) + 1,
+        flown=Samples(t, place, y, source),
+        leg=leg,
+    )
 
 
 def seen(place: Real) -> tuple[Real, Real]:
@@ -167,80 +212,12 @@ def seen(place: Real) -> tuple[Real, Real]:
     return d, np.degrees(np.arcsin(place[:, 2] / d))
 
 
-def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
-    """Return the law for what was measured in `flights`, by means over `seconds`.
+def _robust(A: Real, y: Real, part: Integers) -> Real:
+    """Return the c (1 + p, m) for which A c is nearest to y, then to it without each `part` (k,).
 
-    Of the laws with the exponent 2 or a free one and up to `TERMS` terms of the elevation it is
-    that with the least rms error at what is left out of the fit: each leg in turn and, where
-    several heights were flown, each height. More parameters have to pay. Least squares are robust
-    (Huber). Raises `InputError` where there are fewer than ten means in flight, or all at one
-    place.
-
-    >>> t = np.arange(0.0, 200.0)
-    >>> place = np.stack([300.0 * np.cos(t / 9), 8.0 * t - 700.0, 40.0 + 0.2 * t], axis=1)
-    >>> level = -40.0 - 20.0 * np.log10(np.linalg.norm(place, axis=1))
-    >>> fit = fit_link([Samples(t, place, level)], seconds=1.0)
-    >>> round(fit.level, 6), fit.exponent, fit.holds
-    (-40.0, 2.0, True)
+    By Huber's measure: least squares, reweighted in turn. A single part is never left out.
     """
-    means = tuple(flight.means(seconds) for flight in flights)
-    place = np.concatenate([each.place for each in means])
-    level = np.concatenate([each.level for each in means])
-    source, counts = ", ".join(each.source for each in means), [len(each.t) for each in means]
-    if len(level) < _LEAST or not all(counts):
-        text = f"{', '.join(map(str, counts))} means over {seconds:g} s in flight"
-        raise InputError(f"{source}: {text}; expected at least {_LEAST}, and some of each")
-    if np.ptp(place, axis=0).max() < 1.0:
-        raise InputError(f"{source}: one place alone; expected a flight")
-    legs = legs_of(means)
-    heights = _heights(place[:, 2], legs)
-    parts = [part for part in (legs, heights) if part.max() > 0]
-    d, every = np.linalg.norm(place, axis=1), np.ones((1, len(level)), dtype=np.bool_)
-    slope, s = -10.0 * np.log10(d), place[:, 2] / d
-    columns = np.stack([np.ones_like(d), slope, *(s**k for k in _POWERS)], axis=1)
-    y = level - 2.0 * slope  # that level, n - 2 and terms are to tell, a column each
-    laws = [[0, *free, *range(2, 2 + terms)] for free in ([], [1]) for terms in range(TERMS + 1)]
-    fits = []
-    for law in sorted(laws, key=len) if parts else [[0]]:  # of one leg none can be left out
-        A, c = columns[:, law], np.zeros(columns.shape[1])
-        c[law] = _robust(A, y, every)[0]
-        told = [np.sum(A * _without(A, y, part)[part], axis=1) for part in parts]
-        fits.append((law, c, [_rms(y - each) for each in told or [columns @ c]]))
-    law, c, spread = fits[0]
-    for more, tried, left in fits:
-        pays = np.mean(left) < (1.0 - _PAYS) * np.mean(spread)
-        if (
-            pays
-            and 0.0 <= 2.0 + tried[1] <= _STEEPEST
-            and np.ptp(_SINES**_POWERS @ tried[2:]) <= _SWING
-        ):
-            law, c, spread = more, tried, left
-    count, away = int(legs.max()) + 1, np.full((1, 1), math.inf)
-    if count > 1:
-        without = _without(columns[:, law], y, legs)
-        away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))  # the jackknife
-    errors, used = np.zeros_like(c), max(law[-1], 1) + 1
-    errors[law] = np.linalg.norm(away, axis=0)
-    return LinkFit(
-        level=float(c[0]),
-        exponent=2.0 + float(c[1]),
-        elevation=tuple(c[2:used].tolist()),
-        errors=tuple(errors[:used].tolist()),
-        error=_rms(np.linalg.norm(columns[:, law] @ away.T, axis=1)),
-        spread=spread[-1],
-        paper_spread=fits[0][2][-1],
-        correlation=_correlation(means, y - columns @ c),
-        legs=count,
-        heights=int(heights.max()) + 1,
-        flights=means,
-    )
-
-
-def _robust(A: Real, y: Real, kept: Flags) -> Real:
-    """Return the c (p, m) for which A c is nearest to those of y that are `kept` (p, k).
-
-    By Huber's measure: least squares, reweighted in turn.
-    """
+    kept: Flags = part != np.arange(-1, (part.max() + 1) * part.any())[:, None]
     weight = kept.astype(np.float64)
     for _ in range(_TURNS):
         inverse = np.linalg.pinv((weight[:, None] * A.T) @ A, rcond=_DEPENDENT, hermitian=True)
@@ -252,21 +229,16 @@ def _robust(A: Real, y: Real, kept: Flags) -> Real:
     return c
 
 
-def _without(A: Real, y: Real, part: Integers) -> Real:
-    """Return the c (p, m) of fits from which each `part` (k,) in turn is left out."""
-    return _robust(A, y, part != np.arange(part.max() + 1)[:, None])
-
-
-def legs_of(means: Sequence[Samples]) -> Integers:
+def _legs(flown: Sequence[Samples]) -> Integers:
     """Return the number of each mean's leg, (k,): a flight's stretch without a turn."""
     numbers, leg = list[int](), -1
-    least = max(_LEAST, sum(len(flight.t) for flight in means) // _MOST_LEGS)
-    for flight in means:
+    least = max(_LEAST, sum(len(flight.t) for flight in flown) // _MOST_LEGS)
+    for flight in flown:
         steps = np.diff(flight.place[:, :2], axis=0, prepend=flight.place[:1, :2])
-        course = np.where(np.hypot(*steps.T) > _PACE, np.arctan2(*steps.T), math.nan)
+        course = np.where(lengths(steps) > _PACE, np.arctan2(*steps.T), math.nan)
         leg, first, count = leg + 1, math.nan, 0
         for toward in course.tolist():
-            turned = abs(math.remainder(toward - first, 2.0 * math.pi))
+            turned = abs(math.remainder(toward - first, math.tau))
             if turned > _TURN and count >= least:  # a hover, whose course is NaN, does not turn
                 leg, first, count = leg + 1, toward, 0
             first = toward if math.isnan(first) else first
@@ -275,37 +247,28 @@ def legs_of(means: Sequence[Samples]) -> Integers:
     return np.array(numbers)
 
 
-def _heights(up: Real, legs: Integers) -> Integers:
+def _heights(up: Real, leg: Integers) -> Integers:
     """Return the number of each mean's height, (k,): that of a level leg, or the nearest one's.
 
     `up` (k,) are heights, m; those of different numbers are `APART` apart.
     """
-    flown = [up[legs == leg] for leg in range(int(legs.max()) + 1)]
-    level = np.sort([np.median(leg) for leg in flown if np.ptp(leg) < APART])
-    if len(level) == 0:
-        return np.zeros(len(up), dtype=np.int_)
+    flown = [up[leg == number] for number in range(leg[-1] + 1)]
+    level = np.sort([np.median(each) for each in flown if np.ptp(each) < APART])
     cuts = np.flatnonzero(np.diff(level) > APART)
     return np.searchsorted((level[cuts] + level[cuts + 1]) / 2.0, up)
 
 
-def _correlation(means: Sequence[Samples], residual: Real) -> float:
+def _correlation(place: Real, residual: Real) -> float:
     """Return the L, m, for which exp(-distance/L) is nearest to the residuals' correlation."""
     from scipy.spatial.distance import pdist
 
-    total, pairs = np.zeros((2, len(_LAGS) - 1))
-    ends = np.cumsum([len(flight.t) for flight in means])
-    for flight, rest in zip(means, np.split(residual, ends[:-1]), strict=True):
-        every = -(-len(rest) // _MOST_PAIRED)
-        away, (i, k) = pdist(flight.place[::every]), np.triu_indices(-(-len(rest) // every), 1)
-        total += np.histogram(away, _LAGS, weights=rest[::every][i] * rest[::every][k])[0]
-        pairs += np.histogram(away, _LAGS)[0]
-    power = float(np.mean(residual**2))
-    if power == 0.0:
-        return 0.0
-    found, L = pairs > 0, _LENGTHS[:, None]
-    model = np.exp(-(_LAGS[:-1] + 5.0)[found] / L)
-    apart = pairs[found] * (total[found] / pairs[found] / power - model) ** 2
-    return float(_LENGTHS[apart.sum(axis=1).argmin()])
+    every = -(-len(residual) // _MOST_PAIRED)
+    away, rest = pdist(place[::every]), residual[::every]
+    product = np.outer(rest, rest)[np.triu_indices(len(rest), 1)]
+    pairs, total = (np.histogram(away, _LAGS, weights=x)[0] for x in (None, product))
+    model = np.exp(-(_LAGS[:-1] + 5.0) / _LENGTHS[:, None])
+    apart = np.mean(residual**2) * model**2 @ pairs - 2.0 * model @ total
+    return float(_LENGTHS[apart.argmin()])
 
 
 def _rms(x: Real) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.radio.fit import APART, LinkFit, legs_of
+from faao_mav.radio.fit import APART, LinkFit
 from faao_mav.radio.gain_map import GainMap
 
 _MOST_MEANS = 1000
@@ -32,16 +32,17 @@ def kriged(fit: LinkFit, station: Sequence[float]) -> tuple[GainMap | None, floa
     Those are at legs left out one by one. `station` is latitude and longitude, degrees, of the
     antenna: the map's own origin. The map is None where it tells those legs no better.
     """
-    every = -(-fit.count // _MOST_MEANS)
-    place, legs = fit.place[::every], legs_of(fit.flights)[::every]
-    level = np.concatenate([flight.level for flight in fit.flights])[::every]
-    residual = level - fit.gain_db(place)
+    every = -(-fit.means // _MOST_MEANS)
+    place, legs = fit.flown.place[::every], fit.leg[::every]
+    residual = fit.flown.level[::every] - fit.gain_db(place)
     away = np.linalg.norm(place[:, None] - place, axis=-1)
     alone = float(np.sqrt(np.mean(residual**2)))
     found, error, length = None, alone, 0.0
-    for L in np.maximum(1.0, fit.correlation * np.array(_LENGTHS)):
+    for L in np.maximum(1.0, fit.correlation_m * np.array(_LENGTHS)):
         for nugget in _NUGGETS:
-            inverse = np.linalg.inv((1 - nugget) * np.exp(-away / L) + nugget * np.eye(len(level)))
+            inverse = np.linalg.inv(
+                (1 - nugget) * np.exp(-away / L) + nugget * np.eye(len(residual))
+            )
             tried = _left_out(inverse, residual, legs)
             if tried < error:
                 found, error, length = (1 - nugget) * (inverse @ residual), tried, float(L)

@@ -1,11 +1,9 @@
 """Levels of a link that were measured in flight: their units, and tables of them (CSV)."""
 
-import csv
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -25,51 +23,40 @@ _MOST_BYTES = 200_000_000
 _FARTHEST = 100_000.0
 """Metres from the station beyond which positions are taken for mistaken. Chosen."""
 
-_SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
-_DEGREES = {"": 1.0, "deg": 1.0, "degrees": 1.0}
-_METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "ft": 0.3048, "feet": 0.3048}
-_MBIT_PER_S = {
-    unit.format(prefix): size
-    for prefix, size in (("m", 1.0), ("k", 1e-3), ("", 1e-6))
-    for unit in ("{}bit/s", "{}bps", "{}bit_per_s")
+_COLUMNS = {
+    "time": ("time timestamp t seconds", "s sec seconds ms us"),
+    "latitude": ("latitude lat", "deg degrees"),
+    "longitude": ("longitude lon lng long", "deg degrees"),
+    "altitude": ("altitude alt height", "m meters metres ft feet"),
+    "rsrp": ("rsrp", "dbm"),
+    "rssi": ("rssi power signal", "dbm sik raw"),
+    "snr": ("snr sinr", "db"),
+    "throughput": (
+        "throughput rate goodput",
+        "mbit/s mbps mbit_per_s kbit/s kbps kbit_per_s bit/s bps bit_per_s",
+    ),
 }
-_COLUMNS: Mapping[str, tuple[str, Mapping[str, float]]] = {
-    "time": ("time timestamp t seconds", _SECONDS),
-    "latitude": ("latitude lat", _DEGREES),
-    "longitude": ("longitude lon lng long", _DEGREES),
-    "altitude": ("altitude alt height", _METRES),
-    "rsrp": ("rsrp", {"dbm": 1.0}),
-    "rssi": ("rssi power signal", {"dbm": 1.0, "sik": 1.0, "raw": 1.0}),
-    "snr": ("snr sinr", {"db": 1.0}),
-    "throughput": ("throughput rate goodput", _MBIT_PER_S),
+"""What a table's header may call its columns, of which the last four are levels, and their units.
+`sik` is what SiK radios count, `raw` is any other device's count."""
+
+_SCALES = {"ms": 1e-3, "us": 1e-6, "ft": 0.3048, "feet": 0.3048} | {
+    f"{prefix}{unit}": scale
+    for prefix, scale in (("k", 1e-3), ("", 1e-6))
+    for unit in ("bit/s", "bps", "bit_per_s")
 }
-"""What a table's header may call its columns, of which the last four are levels, and their units in
-s, degrees, m, dB and Mbit/s. `sik` is what SiK radios count, `raw` is any other device's count."""
+"""Those units in s, m and Mbit/s that are not 1; others are s, degrees, m, dB and Mbit/s."""
 
 _PLACES, _LEVELS = tuple(_COLUMNS)[:4], tuple(_COLUMNS)[4:]
-_CALLED = {word: name for name, (words, _) in _COLUMNS.items() for word in words.split()}
 
 SIK_STEP, _SIK_AT_ZERO = 1.0 / 1.9, -127.0
 """dB a count of a SiK radio, and dBm that it counts as 0 (ArduPilot, "SiK Radio: Advanced
 Configuration", which calls it approximate)."""
 
-Calibration: TypeAlias = Sequence[Sequence[float]]
-"""Counts of a device, and the dBm that they are: one or two."""
-
-_SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0)}
+_SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0), "mbit/s": (-math.inf, math.inf)}
 """The least and the greatest level of a unit; beyond them it is another unit."""
 
-
-@dataclass(frozen=True, slots=True)
-class Measured:
-    """What was measured in a flight: `samples`, the `unit` of their levels, rows left out.
-
-    The unit is `dbm` of received power, `db` of signal to noise, or `mbit/s`.
-    """
-
-    samples: Samples
-    unit: str
-    left_out: int = 0
+Calibration: TypeAlias = Sequence[Sequence[float]]
+"""Counts of a device, and the dBm that they are: one or two."""
 
 
 def read_measured(
@@ -77,7 +64,7 @@ def read_measured(
     station: Sequence[float],
     units: Mapping[str, str] = MappingProxyType({}),
     calibration: Calibration = (),
-) -> Measured:
+) -> Samples:
     r"""Return the flight in the table `path`: time, latitude, longitude, altitude and one level.
 
     Levels are rsrp, rssi, snr or throughput. `station` is latitude and longitude, degrees, and
@@ -91,45 +78,42 @@ def read_measured(
     ...     text = "time_s,lat,lon,alt_m,rssi_dbm\n0,47.001,8.0,60,-70\n"
     ...     _ = table.write_text(text)
     ...     found = read_measured(table, (47.0, 8.0, 10.0))
-    >>> found.unit, found.samples.place.round().tolist(), found.samples.level.tolist()
+    >>> found.unit, found.place.round().tolist(), found.level.tolist()
     ('dbm', [[0.0, 111.0, 50.0]], [-70.0])
     """
     path = Path(path)
-    if unknown := units.keys() - _COLUMNS.keys():
-        text = f"--unit {min(unknown)}: no such column; give one of {', '.join(_COLUMNS)}"
-        raise InputError(text)
     text = read_text(path, _MOST_BYTES, "a table of measured levels", InputError)
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    between = max(";\t,", key="".join(lines[:1]).count)
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")] or [
+        ""
+    ]
+    between = max(";\t,", key=lines[0].count)
     if between == ";":
         lines[1:] = [line.replace(",", ".") for line in lines[1:]]
-    rows = csv.reader(lines, delimiter=between)
-    try:
-        return measured_in(path, next(rows, []), rows, station, units, calibration)
-    except csv.Error as error:
-        raise InputError(f"{path}: {error}; expected rows of numbers") from None
+    rows = (line.replace('"', "").split(between) for line in lines)
+    return measured_in(path, next(rows), [*rows], station, units, calibration)
 
 
 def measured_in(
     path: Path,
     header: Sequence[str],
-    rows: Iterable[Sequence[str | float]],
+    rows: Sequence[Sequence[str | float]],
     station: Sequence[float],
     units: Mapping[str, str],
     calibration: Calibration,
-) -> Measured:
+) -> Samples:
     """Return the flight in `rows` under a `header`, of the log `path`; see `read_measured`."""
-    columns, unit_of = _columns(path, header, units)
-    numbers = [[_number(row, k, name) for name, k in columns.items()] for row in rows]
-    found = np.array(numbers, dtype=np.float64).reshape(-1, len(columns))
-    sound = np.isfinite(found).all(axis=1)
+    columns = _columns(path, header, units)
+    found = np.array([[_number(row, k, name) for row in rows] for name, (k, _) in columns.items()])
+    sound = np.isfinite(found).all(axis=0)
     if not sound.any():
         raise InputError(f"{path}: no row with {', '.join(columns)}; expected the rows of a flight")
-    scales = [_COLUMNS[name][1][unit_of[name]] for name in columns]
-    kept = dict(zip(columns, (found[sound] * scales).T, strict=True))
+    kept = {
+        name: _SCALES.get(unit, 1.0) * each[sound]
+        for (name, (_, unit)), each in zip(columns.items(), found, strict=True)
+    }
     t, latitude, longitude, altitude = (kept.pop(name) for name in _PLACES)
     ((name, told),) = kept.items()
-    level, unit = _level(path, told, unit_of[name], calibration)
+    level, unit = _level(path, told, columns[name][1], calibration)
     if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
         raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
     local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
@@ -139,14 +123,12 @@ def measured_in(
             f"{path}: {away / 1000:,.0f} km from --station {station[0]:g},{station[1]:g}; expected "
             "a flight about it: are latitude and longitude exchanged?"
         )
-    order = np.argsort(t, kind="stable")
     place = np.column_stack([local, altitude - station[2]])
-    samples = Samples(t[order], place[order], level[order], path.name)
-    return Measured(samples, unit, int(np.sum(~sound)))
+    return Samples(t, place, level, path.name, unit, int(np.sum(~sound)))
 
 
 def _level(path: Path, told: Real, unit: str, calibration: Calibration) -> tuple[Real, str]:
-    """Return levels `told` (k,) in `unit` as those of a `Measured`, and their unit.
+    """Return levels `told` (k,) in `unit` as those of `Samples`, and their unit.
 
     Counts are linear in dBm through the points of the `calibration`; with one point, or none, they
     have the steps, or all, of SiK radios.
@@ -157,14 +139,11 @@ def _level(path: Path, told: Real, unit: str, calibration: Calibration) -> tuple
                 f"{path}: a device's own counts; expected two of them in dBm by --calibrate "
                 "COUNT=DBM, or --unit rssi=sik, the counts of SiK radios"
             )
-        slope, level = SIK_STEP, _SIK_AT_ZERO
-        (count, level), *more = calibration or [(0.0, level)]
-        for other, dbm in more:
-            slope = (dbm - level) / (other - count)
-        told, unit = level + slope * (told - count), "dbm"
+        (count, dbm), *more = calibration or [(0.0, _SIK_AT_ZERO)]
+        slope = (more[0][1] - dbm) / (more[0][0] - count) if more else SIK_STEP
+        told, unit = dbm + slope * (told - count), "dbm"
     unit = unit if unit in _SOUND else "mbit/s"
-    least, most = _SOUND.get(unit, (-math.inf, math.inf))
-    middle = float(np.median(told))
+    (least, most), middle = _SOUND[unit], float(np.median(told))
     if not least <= middle <= most:
         text = f"levels about {middle:g} {unit}; expected {least:g} to {most:g}: is that the unit?"
         raise InputError(f"{path}: {text}")
@@ -173,26 +152,30 @@ def _level(path: Path, told: Real, unit: str, calibration: Calibration) -> tuple
 
 def _columns(
     path: Path, header: Sequence[str], units: Mapping[str, str]
-) -> tuple[dict[str, int], dict[str, str]]:
+) -> dict[str, tuple[int, str]]:
     """Return by quantity its column in `header`, and its unit; of several levels the first."""
-    columns, unit_of = dict[str, int](), dict[str, str]()
+    if unknown := units.keys() - _COLUMNS.keys():
+        text = f"--unit {min(unknown)}: no such column; give one of {', '.join(_COLUMNS)}"
+        raise InputError(text)
+    called = {word: name for name, (words, _) in _COLUMNS.items() for word in words.split()}
+    found: dict[str, tuple[int, str]] = {}
     for number, told in enumerate(header):
-        words = re.findall(r"[^\s_()\[\],]+", told.lower())
-        name = _CALLED.get(words[0]) if words else None
-        if name is None or not columns.keys().isdisjoint(_LEVELS if name in _LEVELS else [name]):
+        first, *rest = re.findall(r"[^\s_()\[\],]+", told.lower()) or [""]
+        name = called.get(first)
+        if name is None or not found.keys().isdisjoint(_LEVELS if name in _LEVELS else [name]):
             continue
-        unit, known = units.get(name, "_".join(words[1:])).lower(), _COLUMNS[name][1]
-        if unit not in known:
+        unit, known = units.get(name, "_".join(rest)).lower(), _COLUMNS[name][1].split()
+        if unit not in known and (unit or name not in _PLACES[:3]):  # seconds and degrees
             raise InputError(
                 f"{path}: line 1: {told!r} has {f'unit {unit!r}' if unit else 'no unit'}; name it "
-                f"in the header or give --unit {name}=UNIT, one of {', '.join(filter(None, known))}"
+                f"in the header or give --unit {name}=UNIT, one of {', '.join(known)}"
             )
-        columns[name], unit_of[name] = number, unit
-    missing = [name for name in _PLACES if name not in columns]
-    missing += ["one of " + ", ".join(_LEVELS)] * columns.keys().isdisjoint(_LEVELS)
+        found[name] = number, unit
+    missing = [name for name in _PLACES if name not in found]
+    missing += ["one of " + ", ".join(_LEVELS)] * found.keys().isdisjoint(_LEVELS)
     if missing:
         raise InputError(f"{path}: line 1: no column of {', '.join(missing)} in {header}")
-    return columns, unit_of
+    return found
 
 
 def _number(row: Sequence[str | float], column: int, name: str) -> float:

@@ -2,12 +2,11 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.errors import counted
 from faao_mav.radio.fit import SPREAD_OF_NO_LAW, LinkFit, seen
 from faao_mav.radio.gain_map import GainMap
@@ -16,12 +15,12 @@ from faao_mav.radio.terrain import free_space_db
 from faao_mav.report import style
 from faao_mav.report.summary import Line
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+_SHOWN, _LEVELS = 20.0, 16
+"""dB left at which the map's colours end, thrice what shadowing leaves, and colours on its scale:
+their steps can hardly be seen. Chosen."""
 
-_SHOWN = 20.0  # dB left at which the map's colours end: thrice what shadowing leaves. Chosen
-_LEVELS = 16  # colours on that map's scale. Chosen: their steps can hardly be seen
-_MOST_SHOWN = 2000  # means that the page shows at most: a page of a megabyte. Chosen
+_MOST_SHOWN = 2000
+"""Means that the page shows at most: a page of a megabyte. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,42 +37,19 @@ class LinkReport:
     above: GainMap | None = None
 
 
-def law_text(fit: LinkFit) -> str:
-    """Return the law as a sum, of d, m, and of s, the sine of the elevation.
-
-    >>> law_text(LinkFit(-48.5, 2.0, (54.48, -75.2), (), 0, 0, 0, 0, 0, 0, ()))
-    '-48.5 - 20 log10 d + 54.5 s - 75.2 s^2 dB'
-    """
-    text = f"{fit.level:.1f} - {10 * fit.exponent:.3g} log10 d"
-    for k, term in enumerate(fit.elevation, 1):
-        power = "" if k == 1 else f"^{k}"
-        text += f" {'-' if term < 0 else '+'} {abs(term):.1f} s{power}"
-    return f"{text} dB"
-
-
 def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = None) -> LinkReport:
     """Return the report on a `fit`, and for the place of a `station` what it leaves, as a map.
 
     A fit that is not `absolute` has a level within a constant. In the record errors are NaN where
     one leg tells none.
     """
-    lines = list(_fitted_lines(fit, absolute))
-    record: dict[str, Any] = {
-        "reference_gain_db": fit.level if absolute else None,
-        "exponent": fit.exponent,
-        "elevation_db": fit.elevation,
-        "errors": fit.errors,
-        "gain_error_db": fit.error,
-        "spread_db": fit.spread,
-        "paper_spread_db": fit.paper_spread,
-        "correlation_m": fit.correlation,
-        "elevation_deg": fit.elevation_deg,
-        "distance_m": fit.distance_m,
-        "holds": fit.holds,
-        "means": fit.count,
-        "legs": fit.legs,
-        "heights": fit.heights,
-    }
+    rests_on = f"{counted(fit.means, 'mean')} of {fit.flown.source}"
+    lines = list(_fitted_lines(fit, absolute, rests_on))
+    record = {each.name: getattr(fit, each.name) for each in fields(fit)}
+    del record["flown"], record["leg"]
+    record["holds"] = fit.holds
+    if not absolute:
+        record["reference_gain_db"] = None
     if not fit.holds:
         return LinkReport(lines, record, "")
     above = None
@@ -82,42 +58,42 @@ def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = Non
         record |= {"left_out_db": alone, "left_out_map_db": left}
         told = f"none: no map tells legs that are left out better than the law, {alone:.1f} dB"
         if above is not None:
-            fit = replace(fit, spread=left)
+            fit = replace(fit, spread_db=left)
             told = f"{left:.1f} dB at legs left out one by one, {alone:.1f} by the law alone; "
             told += f"{_extent(above)} of the station's antenna"
         lines.append(("map", told))
-    level = f"reference_gain_db: {fit.level:.2f}\n" if absolute else ""
-    terms = ", ".join(f"{term:.2f}" for term in fit.elevation)
+    level = f"reference_gain_db: {fit.reference_gain_db:.2f}\n" if absolute else ""
+    terms = ", ".join(f"{term:.2f}" for term in fit.elevation_db)
     (least, most), (near, far) = fit.elevation_deg, fit.distance_m
     law = (
-        f"# {law_text(fit)}: d the distance, m, s the sine of the elevation\n"
-        f"about: {json.dumps(_rests_on(fit))}\n"
+        f"# {fit}: d the distance, m, s the sine of the elevation\nabout: {json.dumps(rests_on)}\n"
         f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
-        f"spread_db: {fit.spread:.2f}\ncorrelation_m: {fit.correlation:.0f}\n"
+        f"spread_db: {fit.spread_db:.2f}\ncorrelation_m: {fit.correlation_m:.0f}\n"
         f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
     )
     return LinkReport(lines, record, law, above)
 
 
-def _fitted_lines(fit: LinkFit, absolute: bool) -> Iterator[Line]:
+def _fitted_lines(fit: LinkFit, absolute: bool, rests_on: str) -> Iterator[Line]:
     """Yield the law, what it rests on, and what is known of its errors."""
-    yield "gain", law_text(fit) if absolute else f"{law_text(fit)}, within a constant"
+    yield "gain", str(fit) if absolute else f"{fit}, within a constant"
     if not absolute:
         told = "shape only: the plan's radio.reference_gain_db stands; give --power for the level"
         yield "", told
     (near, far), (least, most) = fit.distance_m, fit.elevation_deg
     ranges = f"{near:.0f} to {far:.0f} m away, {least:.0f} to {most:.0f} degrees high"
-    yield "measured", f"{ranges}; {_rests_on(fit)}"
+    yield "measured", f"{ranges}; {rests_on}"
     if fit.legs == 1:
         yield "", "one leg alone: d^-2 with its level, nothing that could be told from it"
     else:
         heights = f" and {fit.heights} heights" if fit.heights > 1 else ""
-        told = f"{fit.spread:.1f} dB at {counted(fit.legs, 'leg')}{heights} left out one by one "
-        told += f"(d^-2: {fit.paper_spread:.1f}), correlated over {fit.correlation:.0f} m"
+        told = f"{fit.spread_db:.1f} dB at {counted(fit.legs, 'leg')}{heights} left out one by one "
+        told += f"(d^-2: {fit.paper_spread_db:.1f}), correlated over {fit.correlation_m:.0f} m"
         yield "spread", told
-        yield "error", f"{fit.error:.1f} dB of the gain where it was flown, one standard error"
+        told = f"{fit.gain_error_db:.1f} dB of the gain where it was flown, one standard error"
+        yield "error", told
     if not fit.holds:
-        told = f"of distance and elevation holds: {fit.spread:.1f} dB are left, more than "
+        told = f"of distance and elevation holds: {fit.spread_db:.1f} dB are left, more than "
         told += f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
         yield "no law", f"{told}stands about it, or fly higher"
 
@@ -161,55 +137,38 @@ def _extent(found: GainMap) -> str:
     return f"{len(found.east)} x {len(found.north)} points by {step:.3g} m, {up} m above that"
 
 
-def _rests_on(fit: LinkFit) -> str:
-    logs = ", ".join(dict.fromkeys(flight.source for flight in fit.flights))
-    return f"{counted(fit.count, 'mean')} of {logs}"
-
-
 def link_page(fit: LinkFit, report: LinkReport) -> str:
     """Return the page about a fit: its report, measured against fitted, and residuals on a map."""
-    from matplotlib.ticker import LogLocator
+    from matplotlib import colormaps
 
     from faao_mav.report.page import facts, figure_section, page, section
 
-    every = -(-fit.count // _MOST_SHOWN)
-    place = fit.place[::every]
-    measured = np.concatenate([flight.level for flight in fit.flights])[::every]
-    law, (away, up) = fit.gain_db(place), seen(place)
-    sections = [section("Link", facts(report.lines), "wide")]
-    for name, x, over, title in (
-        ("distance", away, "distance from the station, m", "distance from the station's antenna"),
-        ("elevation", up, "elevation, degrees", "elevation at which the station sees the UAV"),
-    ):
-        with style.drawing(style.WIDTH, 3.2) as figure:
-            plot = figure.subplots()
-            dots: Any = {"linestyle": "none", "marker": ".", "markersize": 2.5}
+    every = -(-fit.means // _MOST_SHOWN)
+    place, measured = fit.flown.place[::every], fit.flown.level[::every]
+    law = fit.gain_db(place)
+    dots: Any = {"linestyle": "none", "marker": ".", "markersize": 2.5}
+    with style.drawing(style.WIDTH, 6.0) as gains:
+        upper, lower = gains.subplots(2, sharey=True)
+        for plot, x in zip((upper, lower), seen(place), strict=True):
             plot.plot(x, measured, color=style.SERIES[0], alpha=0.4, label="measured", **dots)
             plot.plot(x, law, color=style.SERIES[1], label="fitted", **dots)
-            if name == "distance":
-                plot.set_xscale("log")
-                plot.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-                plot.xaxis.set_major_formatter("{x:g}")
-                plot.minorticks_off()
-            style.label(plot, "", over, "gain, dB")
-            style.legend_above(plot)
-        title = f"Measured and fitted gain over the {title}"
-        sections.append(figure_section(f"Over {name}", figure, title))
-    left = "Measured over fitted gain, dB, where it was flown, metres east and north of the station"
-    sections.append(figure_section("Left by the law", _map(place, measured - law), left))
-    return page("The link as it was measured", "\n".join(sections))
-
-
-def _map(place: Real, residual: Real) -> "Figure":
-    from matplotlib import colormaps
-
-    with style.drawing(style.WIDTH, 3.8) as figure:
-        plot = figure.subplots()
+        style.label(upper, "", "distance from the station, m", "gain, dB")
+        style.label(lower, "", "elevation, degrees", "gain, dB")
+        style.legend_above(upper)
+    with style.drawing(style.WIDTH, 3.8) as left:
+        plot = left.subplots()
         colours = colormaps["coolwarm"].resampled(_LEVELS)
-        shown = plot.scatter(place[:, 0], place[:, 1], 6, residual, cmap=colours)
+        shown = plot.scatter(place[:, 0], place[:, 1], 6, measured - law, cmap=colours)
         shown.set_clim(-_SHOWN, _SHOWN)
         plot.set_aspect("equal", adjustable="datalim")
         style.colour_bar(plot, shown, "measured over fitted, dB", 0.8)
         style.label(plot, "", "east, m", "north, m")
         style.mark_stations(plot, [("station", np.zeros((1, 2)), "s")])
-    return figure
+    title = "Measured and fitted gain over distance and elevation, seen from the station's antenna"
+    told = "Measured over fitted gain, dB, where it was flown, metres east and north of the station"
+    sections = (
+        section("Link", facts(report.lines), "wide"),
+        figure_section("Measured and fitted", gains, title),
+        figure_section("Left by the law", left, told),
+    )
+    return page("The link as it was measured", "\n".join(sections))
