@@ -23,7 +23,7 @@ from faao_mav.optimizer.rates.field import rate_field
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.solution import load_solution, save_solution
 from faao_mav.plan import Plan, parse_plan, read_plan
-from faao_mav.radio.gain import GainFunction, PathGain
+from faao_mav.radio.gain import GainField, GainFunction, PathGain
 from faao_mav.radio.precoder import SCHEMES
 from faao_mav.radio.rate_steps import StreamRate
 from faao_mav.report.page import render_report
@@ -123,8 +123,7 @@ def test_laws_and_rates_of_files_are_in_the_text_of_the_plan(tmp_path: Path) -> 
         assert law.elevation_db == (18, -30, 10)
     assert parse_plan(both.text).radio == both.radio  # without the file
     one = read_plan(written(tmp_path, {"radio.ground_user.gain": "link.yaml"}))
-    assert [law.square for law in one.radio.path_gains] == [True, False]
-    assert one.radio.path_gains[0].reference_gain == one.radio.reference_gain
+    assert one.radio.path_gains[0] == PathGain(one.radio.reference_gain)
     assert one.radio.gain_laws[1].spread_db == 5.5
 
 
@@ -254,10 +253,8 @@ def test_a_law_and_a_precoder_of_ones_own_are_as_the_plans() -> None:
     assert found.is_feasible(1e-6)
     law, height = PathGain(1e-5, 2.4, (5.0, -30.0, 12.0)), 30.0
     away = np.random.default_rng(0).uniform(-300, 300, (2, 40))
-    squared = np.sum(away**2, axis=0) + height**2
-    for told, exact in zip(
-        Same(law).slopes(away, squared, height), law.slopes(away, squared, height), strict=True
-    ):
+    own, plans = (GainField(each, np.zeros(2), height) for each in (Same(law), law))
+    for told, exact in zip(own.slopes(away), plans.slopes(away), strict=True):
         np.testing.assert_allclose(told, exact, rtol=1e-4, atol=1e-4 * np.abs(exact).max())
     told, exact = Same(law).turns(900.0, height), law.turns(900.0, height)
     np.testing.assert_allclose(told, exact, atol=900.0 / 499)

@@ -138,7 +138,7 @@ def _check_plan(problem: Problem) -> None:
     """Raise `PlanError` for plans that Algorithm 1 is not made for."""
     plan, links = problem.plan, problem.links
     inputs, rate = plan.optimizer.inputs, plan.optimizer.rate
-    other_gain = any(link.gains.above or not link.gains.law.square for link in links)
+    other_gain = any(not link.gains.square for link in links)
     for wrong, setting, reason in (
         (plan.radio.fading == "ergodic", "radio.fading: ergodic", "it plans for one known draw"),
         (inputs == "gaussian", "optimizer.inputs: gaussian", "its sums are those of an alphabet"),
@@ -183,7 +183,7 @@ class SumOfExponentials:
 def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
     """Return the constraint of `link` for H_r (N + 2, N_r, N_t) and P (N + 2, N_t, N_t)."""
     classes = link.classes
-    rho_0 = link.gains.law.gain(np.ones(1), link.gains.height)
+    rho_0 = np.exp(link.gains.law.log(np.ones(1), link.gains.height))
     A = rho_0 * exponents(H_r, P, classes.vectors, link.noise)
     # O_B, O_U = 2 (N + 2) N_t log2 rho
     return SumOfExponentials(link, A, len(H_r) * (2 * classes.bits - classes.symbols))

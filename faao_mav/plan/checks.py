@@ -141,8 +141,8 @@ def _gain(plan: PlanContents) -> Iterator[Problem]:
             yield from _whole_map(plan.flight, given, given.whole, key)
             continue
         for height in heights:
-            at = law.best_distance(2 * MAX_LOCAL_DISTANCE, height)
-            gain = float(law.db(np.array(at), height))
+            turns = law.turns(2 * MAX_LOCAL_DISTANCE, height)
+            gain, at = max(zip(law.db(turns, height), turns, strict=True))
             if gain > 0:
                 yield wrong("gain-above-0", key=key, gain=gain, distance=math.hypot(at, height))
 

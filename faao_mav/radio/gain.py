@@ -11,13 +11,12 @@ antennas' patterns and the ground do over the elevation is in c_1 to c_3.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from faao_mav.arrays import Integers, Real, products
 from faao_mav.radio.gain_map import Grid
-from faao_mav.radio.spline import Spline
+from faao_mav.radio.spline import Spline, polynomial
 
 PER_DB = float(np.log(10.0) / 10.0)
 """The natural logarithm of a gain of 1 dB."""
@@ -50,30 +49,9 @@ class GainFunction(ABC):
         At d² (...), m², the one antenna `height` m above the other.
         """
 
-    @property
-    def square(self) -> bool:
-        """Whether this is the paper's rho_0 d^-2."""
-        return False
-
-    def gain(self, squared_distance: Real, height: float) -> Real:
-        """Return the linear gain at d² (...), m²."""
-        return np.asarray(np.exp(self.log(squared_distance, height)))
-
     def db(self, distance: Real, height: float | Real) -> Real:
         """Return the gain in dB at horizontal distances (...), m."""
         return self.log(np.asarray(distance) ** 2 + height**2, height) / PER_DB
-
-    def slopes(self, away: Real, squared_distance: Real, height: float) -> tuple[Real, Real]:
-        """Return gradient (2, ...) and Hessian (3, ...) of l by place, at w - p = `away` (2, ...).
-
-        The Hessian's entries are xx, xy and yy. With t = ln d², both are those of t times l_t and
-        l_tt.
-        """
-        by_t, bent = self.by_log_distance(squared_distance, height)
-        t_i = 2 * away / squared_distance
-        hessian = (bent - by_t) * products(t_i, t_i)
-        hessian[[0, 2]] += by_t * (2 / squared_distance)
-        return by_t * t_i, hessian
 
     def by_log_distance(self, squared_distance: Real, height: float) -> tuple[Real, Real]:
         """Return l_t and l_tt (...) by t = ln d²: here by central differences."""
@@ -91,15 +69,6 @@ class GainFunction(ABC):
         rises = np.diff(self.log(distances**2 + height**2, height)) > 0
         return distances[[0, *(1 + np.flatnonzero(np.diff(rises))), -1]]
 
-    def best_distance(self, farthest: float, height: float) -> float:
-        """Return the horizontal distance up to `farthest`, m, at which the gain is highest.
-
-        >>> PathGain(1e-5).best_distance(900.0, 100.0)
-        0.0
-        """
-        distances = self.turns(farthest, height)
-        return float(distances[np.argmax(self.log(distances**2 + height**2, height))])
-
 
 @dataclass(frozen=True)
 class PathGain(GainFunction):
@@ -114,20 +83,17 @@ class PathGain(GainFunction):
     exponent: float = 2.0
     elevation_db: tuple[float, ...] = ()
 
-    @property
-    def square(self) -> bool:
-        """Whether this is the paper's rho_0 d^-2."""
-        return self.exponent == 2.0 and not any(self.elevation_db)
-
     def log(self, squared_distance: Real, height: float | Real) -> Real:
-        """Return l, the natural logarithm of `gain`, (...)."""
+        """Return l, the natural logarithm of the linear gain, (...)."""
         by_distance = np.log(self.reference_gain) - self.exponent / 2 * np.log(squared_distance)
-        return np.asarray(by_distance + self._elevation(height / np.sqrt(squared_distance), 0))
+        s = height / np.sqrt(squared_distance)
+        return np.asarray(by_distance + polynomial(self._terms(0), s))
 
     def by_log_distance(self, squared_distance: Real, height: float) -> tuple[Real, Real]:
         """Return l_t and l_tt (...) by t = ln d², where d s / d t = -s / 2."""
         s = height / np.sqrt(squared_distance)
-        return -self.exponent / 2 + self._elevation(s, 1), self._elevation(s, 2)
+        by_t = polynomial(self._terms(1), s) - self.exponent / 2
+        return by_t, polynomial(self._terms(2), s)
 
     def turns(self, farthest: float, height: float) -> Real:
         """Return where l turns, as distances on the ground (k,) from 0 to `farthest`, m.
@@ -137,26 +103,20 @@ class PathGain(GainFunction):
         >>> PathGain(1e-5, elevation_db=(0.0, -10.0)).turns(900.0, 100.0).round(1).tolist()
         [0.0, 114.1, 900.0]
         """
-        found = np.empty(0)
-        if height:
-            terms = [k * c for k, c in enumerate(self._terms, 1)]
-            roots = np.roots([*terms[::-1], self.exponent])  # of -2 l_t, a polynomial of s
-            s = roots.real[np.abs(roots.imag) < _REAL * np.abs(roots)]
-            s = s[(s / height > 0) & (np.abs(s) <= 1)]
-            found = np.sqrt(np.maximum(0.0, (height / s) ** 2 - height**2))
+        by_t = self._terms(1)
+        by_t[-1] -= self.exponent / 2
+        roots = np.sign(height) * np.roots(by_t)
+        s = roots.real[np.abs(roots.imag) < _REAL * np.abs(roots)]
+        found = np.abs(height) * np.sqrt(1 / s[(s > 0) & (s <= 1)] ** 2 - 1)
         return np.array([0.0, *np.sort(found[found < farthest]), farthest])
 
-    @cached_property
-    def _terms(self) -> Real:
-        """The terms c_1, c_2, ... in natural logarithms, (k,)."""
-        return PER_DB * np.array(self.elevation_db, dtype=np.float64)
+    def _terms(self, order: int) -> Real:
+        """Return the terms of the elevation, or those of the derivative of an `order` by t.
 
-    def _elevation(self, s: Real, order: int) -> Real:
-        """Return the terms of the elevation, or their derivative by t of an `order`, at s (...)."""
-        total = np.zeros_like(s)
-        for k in range(len(self._terms), 0, -1):
-            total = (total + (-k / 2) ** order * self._terms[k - 1]) * s
-        return total
+        They are coefficients by powers of s, the highest first, (k + 1,), natural logarithms.
+        """
+        terms = PER_DB * np.array([*self.elevation_db[::-1], 0.0])
+        return np.asarray((np.arange(len(terms) - 1, -1, -1) / -2) ** order * terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +139,13 @@ class GainField:
     station: Real
     height: float
     above: Spline | None = None
+
+    @property
+    def square(self) -> bool:
+        """Whether this is the paper's rho_0 d^-2, without a map."""
+        law = self.law
+        paper = isinstance(law, PathGain) and law.exponent == 2 and not any(law.elevation_db)
+        return paper and self.above is None
 
     @property
     def midway(self) -> Real:
@@ -210,13 +177,19 @@ class GainField:
 
     def gain(self, w: Real) -> Real:
         """Return the linear gain (..., n) at positions w (2, ..., n), m."""
-        found = self.law.gain(self.squared_distance(self.away(w)), self.height)
-        return found if self.above is None else found * np.exp(PER_DB * self.above.value(*w))
+        return np.asarray(np.exp(self.log(w)))
 
     def slopes(self, w: Real) -> tuple[Real, Real]:
-        """Return gradient (2, ..., n) and Hessian xx, xy, yy (3, ..., n) of l by w (2, ..., n)."""
+        """Return gradient (2, ..., n) and Hessian xx, xy, yy (3, ..., n) of l by w (2, ..., n).
+
+        By the law they are those of t = ln d² times l_t and l_tt.
+        """
         away = self.away(w)
-        gradient, hessian = self.law.slopes(away, self.squared_distance(away), self.height)
+        d2 = self.squared_distance(away)
+        by_t, bent = self.law.by_log_distance(d2, self.height)
+        t_i = 2 * away / d2
+        gradient, hessian = by_t * t_i, (bent - by_t) * products(t_i, t_i)
+        hessian[[0, 2]] += by_t * (2 / d2)
         if self.above is not None:
             _, x, y, xx, xy, yy = self.above.by_both(*w)
             gradient = gradient + PER_DB * np.stack([x, y])
@@ -233,9 +206,8 @@ class GainField:
         """Return the most of l (...) by the law at distances from `near` to `far` (...), m."""
         most = np.maximum(self._by_law(near), self._by_law(far))
         for turn in self.law.turns(float(far.max()), self.height)[1:-1]:
-            most = np.where(
-                (near < turn) & (turn < far), np.maximum(most, self._by_law(turn)), most
-            )
+            inside = (near < turn) & (turn < far)
+            most = np.where(inside, np.maximum(most, self._by_law(turn)), most)
         return most
 
     def _by_law(self, distance: Real) -> Real:

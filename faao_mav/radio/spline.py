@@ -46,28 +46,28 @@ class Spline:
     def value(self, x: Real, y: Real) -> Real:
         """Return f at x (...) and y (...)."""
         cell, s, t = self._cell(x, y)
-        return _value(_value(cell, t), s)
+        return polynomial(polynomial(cell, t), s)
 
     def by_x(self, x: Real, y: Real) -> tuple[Real, Real, Real]:
         """Return f, f_x and f_xx."""
         cell, s, t = self._cell(x, y)
-        along = _value(cell, t)
+        along = polynomial(cell, t)
         slope = _derived(along)
-        return _value(along, s), _value(slope, s), _value(_derived(slope), s)
+        return polynomial(along, s), polynomial(slope, s), polynomial(_derived(slope), s)
 
     def by_both(self, x: Real, y: Real) -> tuple[Real, Real, Real, Real, Real, Real]:
         """Return f, f_x, f_y, f_xx, f_xy and f_yy."""
         cell, s, t = self._cell(x, y)
         by_y = _derived(cell)
-        f, f_y, f_yy = (_value(part, t) for part in (cell, by_y, _derived(by_y)))
+        f, f_y, f_yy = (polynomial(part, t) for part in (cell, by_y, _derived(by_y)))
         f_x = _derived(f)
         return (
-            _value(f, s),
-            _value(f_x, s),
-            _value(f_y, s),
-            _value(_derived(f_x), s),
-            _value(_derived(f_y), s),
-            _value(f_yy, s),
+            polynomial(f, s),
+            polynomial(f_x, s),
+            polynomial(f_y, s),
+            polynomial(_derived(f_x), s),
+            polynomial(_derived(f_y), s),
+            polynomial(f_yy, s),
         )
 
     def _cell(self, x: Real, y: Real) -> tuple[Real, Real, Real]:
@@ -87,7 +87,7 @@ def _located(grid: Real, x: Real) -> tuple[Integers, Real]:
     return cell, inside - cell * step
 
 
-def _value(c: Real, t: Real) -> Real:
+def polynomial(c: Real, t: Real) -> Real:
     """Return the polynomials c (degree + 1, ...), highest powers first, at t."""
     found: Real = c[0]
     for lower in c[1:]:

@@ -67,7 +67,7 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
             tell(1, "the bound by the axis", value)
             value = min(value, axis_bound(problem, rates))
         # the axis takes the most of all larger distances: with a gain that rises there, too much
-        other = any(not field.law.square for field in fields)
+        other = any(not field.square for field in fields)
         if not accelerating or half or problem.free_area is not None or other or not radial:
             tell(1, "the bound over the map", value)
             value = min(value, map_bound(problem, rates))
