@@ -32,7 +32,7 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
 from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, sparing_starts, starts
-from faao_mav.optimizer.shadowing import TOLLS, spread_known, tolled, under_shadowing
+from faao_mav.optimizer.shadowing import TOLLS, tolled, under_shadowing
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.rate_steps import RateSteps
 
@@ -97,7 +97,7 @@ def direct(
     best = optima[search.best({name: each.value for name, each in optima.items()}, ends)]
     if isinstance(own_steps, RateSteps):
         best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
-    if spread_known(problem):
+    if any(problem.plan.radio.spreads):
         best = search.under_shadowing(best)
     flight = best.trajectory
     precoders = [

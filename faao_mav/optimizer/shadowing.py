@@ -54,30 +54,26 @@ TOLLS = (0.25, 0.5, 0.9, 1.4)
 or none."""
 
 
-def spread_known(problem: Problem) -> bool:
-    """Return whether the plan says of a hop how far it is off its law."""
-    return any(law.spread_db is not None for law in problem.plan.radio.gain_laws)
-
-
 def shadows(problem: Problem, w: Real, count: int = SHADOWINGS) -> Iterator[Real]:
     """Yield shadowings of both hops at positions w (n, 2), dB, (2, n) each; by the plan's seed.
 
     Of a station that moves the field is over its places too. A wave number with the spectrum of
     exp(-r / D) is a Gaussian over the size of another.
     """
-    laws = problem.plan.radio.gain_laws
-    spread = np.array([[law.spread_db or 0.0] for law in laws]) * np.sqrt(2 / _WAVES)
-    rng = np.random.default_rng([problem.plan.radio.seed, 2])
-    stations = [link.gains.station for link in problem.links]
-    places = [np.hstack([w, p]) if p.ndim > 1 else w for p in stations]
+    radio, fields = problem.plan.radio, []
+    rng = np.random.default_rng([radio.seed, 2])
+    for link, law, spread in zip(problem.links, radio.gain_laws, radio.spreads, strict=True):
+        p = link.gains.station
+        places = np.hstack([w, p]) if p.ndim > 1 else w
+        fields.append((places, law.correlation_m, spread * np.sqrt(2 / _WAVES)))
     for _ in range(count):
-        found = np.empty((2, len(w)))
-        for hop, law in enumerate(laws):
-            size = np.abs(rng.standard_normal((_WAVES, 1))) * law.correlation_m
-            waves = rng.standard_normal((_WAVES, places[hop].shape[1])) / size
+        found = []
+        for places, D, height in fields:
+            size = np.abs(rng.standard_normal((_WAVES, 1))) * D
+            waves = rng.standard_normal((_WAVES, places.shape[1])) / size
             phases = rng.uniform(0, 2 * np.pi, (_WAVES, 1))
-            found[hop] = np.cos(waves @ places[hop].T + phases).sum(axis=0)
-        yield spread * found
+            found.append(height * np.cos(waves @ places.T + phases).sum(axis=0))
+        yield np.array(found)
 
 
 def outcomes(problem: Problem, w: Real, rates: Rates, count: int = SHADOWINGS) -> Real:
@@ -85,10 +81,10 @@ def outcomes(problem: Problem, w: Real, rates: Rates, count: int = SHADOWINGS) -
 
     Bits per slot and hertz (count, n), each the sum of what was before; see `arriving`.
     """
-    most = _REACH * max(law.spread_db or 0.0 for law in problem.plan.radio.gain_laws)
+    most = _REACH * max(problem.plan.radio.spreads)
     table, now = np.array([rates(db) for db in np.linspace(-most, most, _OFFSETS)]), rates(0.0)
     shares = problem.relay.best_shares(now[0], now[1], problem.kinematics.time_step)
-    hop, slot, found = np.arange(2)[:, None], np.arange(len(w)), []
+    (hop, slot), found = np.ogrid[:2, : len(w)], []
     for shadow in shadows(problem, w, count):
         place = np.clip((shadow / most + 1) / 2, 0, 1) * (_OFFSETS - 1)
         below = np.minimum(place.astype(np.intp), _OFFSETS - 2)
@@ -125,12 +121,13 @@ class Shadowed:
 
 def shadowed(solution: Solution) -> Shadowed | None:
     """Return what arrives of a solution with its precoders; None where no spread is known."""
-
-    def rates(db: float) -> Real:
-        return np.array(solution.recomputed_slots(10 ** (db / 10)))
-
-    problem = solution.problem
-    return under_shadowing(problem, solution.w, rates) if spread_known(problem) else None
+    if not any(solution.plan.radio.spreads):
+        return None
+    return under_shadowing(
+        solution.problem,
+        solution.w,
+        lambda db: np.array(solution.recomputed_slots(10 ** (db / 10))),
+    )
 
 
 def under_shadowing(problem: Problem, w: Real, rates: Rates) -> Shadowed:
@@ -154,18 +151,15 @@ def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> S
     most, *less = (arriving(problem, now * np.array(part))[-1] / len(w) for part in parts)
     lost = np.maximum(_TINY, most - np.array(less))
     a = slopes * (lost / lost.sum())[:, None] / len(w)
-    laws, every = problem.plan.radio.gain_laws, -(-len(w) // _PLACES)
-    far = 2 * max(law.correlation_m for law in laws)
+    radio, every = problem.plan.radio, -(-len(w) // _PLACES)
+    far = 2 * max(law.correlation_m for law in radio.gain_laws)
     x, y = (np.linspace(each.min() - far, each.max() + far, _CELLS) for each in w.T)
-    places, maps, variance = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1), [], _TINY
-    for law, each in zip(laws, a, strict=True):
-        variances = (law.spread_db or 0.0) ** 2 * each
+    maps, variance = [], _TINY
+    for law, spread, each in zip(radio.gain_laws, radio.spreads, a, strict=True):
         rounded = max(_ROUND * law.correlation_m, x[1] - x[0], y[1] - y[0])
-        felt = np.zeros(places.shape[:2])
-        for place, part in zip(w[::every], variances[::every], strict=True):
-            away = np.sqrt(np.sum((places - place) ** 2, axis=-1) + rounded**2)
-            felt += every * part * np.exp(-away / law.correlation_m)
-        maps.append(Spline.through(x, y, felt))
+        away = np.hypot(x[:, None, None] - w[::every, 0], y[:, None] - w[::every, 1])
+        felt = np.exp(-np.hypot(away, rounded) / law.correlation_m) @ each[::every]
+        maps.append(Spline.through(x, y, every * spread**2 * felt))
         variance += float(each @ maps[-1].value(*w.T))
     before = np.stack([each.value(*w.T) for each in maps])
     factors = z * slopes / np.sqrt(variance)

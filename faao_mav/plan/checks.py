@@ -66,7 +66,7 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
         "least-speed": vehicle.min_speed > vehicle.max_speed,
         "buffer-bandwidth": radio.relay.buffer_mbytes is not None and no_band,
         "rates-bandwidth": radio.rates is not None and radio.rates.mbit_per_s and no_band,
-        "reliability-spread": reliable and all(law.spread_db is None for law in radio.gain_laws),
+        "reliability-spread": reliable and not any(radio.spreads),
         "algorithm1-causal": paper and radio.causal,
         "algorithm1-reliability": paper and reliable,
         "algorithm1-fence": paper and plan.geofence,

@@ -232,6 +232,12 @@ class Radio:
         return self.base_station.gain or self.gain, self.ground_user.gain or self.gain
 
     @property
+    def spreads(self) -> tuple[float, float]:
+        """The standard deviation of shadowing about the law of each hop, dB; 0: unknown."""
+        first, second = self.gain_laws
+        return first.spread_db or 0.0, second.spread_db or 0.0
+
+    @property
     def path_gains(self) -> tuple[PathGain, PathGain]:
         """The law of each hop's path gain: 0 dB under a map of the gain itself."""
         first, second = self.gain_laws

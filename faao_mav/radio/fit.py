@@ -34,21 +34,28 @@ _TURN, _LEAST, _MOST_LEGS = math.radians(45.0), 10, 100
 """A leg ends where its course has turned by so much, after so many means, or after so many as make
 so many legs. Chosen: each leg is left out once."""
 
-_PACE, APART = 1.0, 10.0
-"""Metres between two means below which they are a hover's, which has no course; and between heights
-that are left out one by one. Chosen: twice what a copter holds."""
+_PACE = 1.0
+"""Metres between two means below which they are a hover's, which has no course. Chosen."""
 
-_SINES, _SWING, _STEEPEST = np.linspace(0.0, 1.0, 101), 40.0, 10.0
-"""Sines from the horizon to the zenith, and dB by which the terms of the elevation may differ
-between them. Chosen: deeper nulls of antennas are no polynomial's, and beyond what was flown one
-may do anything. Last the greatest exponent, the least being 0: what a plan takes."""
+APART = 10.0
+"""Metres between heights that are left out one by one. Chosen: twice what a copter holds."""
+
+_SWING = 40.0
+"""dB by which the terms of the elevation may differ between the horizon and the zenith. Chosen:
+deeper nulls of antennas are no polynomial's, and beyond what was flown one may do anything."""
+
+_STEEPEST = 10.0
+"""The greatest exponent of a law, the least being 0: what a plan takes."""
 
 _PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
-_LAGS, _LENGTHS, _MOST_PAIRED = np.arange(0.0, 310.0, 10.0), np.geomspace(1.0, 1000.0, 1000), 2000
-"""Bounds, m, of the distances between two places at which residuals are compared, the lengths of
-correlation that are tried, and means that are compared at most, for time and memory. Chosen."""
+_LAGS, _LENGTHS = np.arange(0.0, 310.0, 10.0), np.geomspace(1.0, 1000.0, 1000)
+"""Bounds, m, of the distances between two places at which residuals are compared, and the lengths
+of correlation that are tried. Chosen."""
+
+_MOST_PAIRED = 2000
+"""Means that are compared with each other at most, for time and memory. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +184,7 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
                 each = _robust(A, left_y, part)
                 errors.append(_rms(left_y - np.sum(A * each[part + part.any()], axis=1)))
         c[law] = each[0]
-        terms = np.polyval([*c[:1:-1], 0.0], _SINES)
+        terms = np.polyval([*c[:1:-1], 0.0], np.linspace(0.0, 1.0, 101))
         sound = 0.0 <= 2.0 + c[1] <= _STEEPEST and np.ptp(terms) <= _SWING
         if not found or (sound and np.mean(errors) < (1.0 - _PAYS) * np.mean(found[-1][3])):
             found.append((law, c, each[1:], errors))

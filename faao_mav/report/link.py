@@ -15,12 +15,9 @@ from faao_mav.radio.terrain import free_space_db
 from faao_mav.report import style
 from faao_mav.report.summary import Line
 
-_SHOWN, _LEVELS = 20.0, 16
-"""dB left at which the map's colours end, thrice what shadowing leaves, and colours on its scale:
-their steps can hardly be seen. Chosen."""
-
-_MOST_SHOWN = 2000
-"""Means that the page shows at most: a page of a megabyte. Chosen."""
+_SHOWN = 20.0  # dB left at which the map's colours end: thrice what shadowing leaves. Chosen
+_LEVELS = 16  # colours on that map's scale. Chosen: their steps can hardly be seen
+_MOST_SHOWN = 2000  # means that the page shows at most: a page of a megabyte. Chosen
 
 
 @dataclass(frozen=True, slots=True)
