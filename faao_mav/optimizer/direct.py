@@ -32,7 +32,7 @@ from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
 from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, sparing_starts, starts
-from faao_mav.optimizer.shadowing import TOLLS, tolled, under_shadowing
+from faao_mav.optimizer.shadowing import SHADES, shaded, under_shadowing
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.radio.rate_steps import RateSteps
 
@@ -223,10 +223,9 @@ class _Search:
     def under_shadowing(self, optimum: LocalOptimum) -> LocalOptimum:
         """Return the best under shadowing of `optimum` and of those less about one place."""
         begin, problem, field = optimum.trajectory, self.problem, self.field
-        rates, options = partial(field.value, begin.w.T), problem.plan.optimizer
-        found = [optimum]
-        for z in TOLLS:
-            stage = tolled(problem, field.smoothed(), begin.w, rates, z)
+        options, found = problem.plan.optimizer, [optimum]
+        for z in SHADES:
+            stage = shaded(problem, field.smoothed(), begin.w, z)
             limits = options.tolerance, options.max_iterations
             found.append(problem.improved(stage, begin, *limits, warm=True))
 

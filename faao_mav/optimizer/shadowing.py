@@ -7,19 +7,20 @@ one place. To first order the variance of what arrives is
 
     V = sum_j sigma_j^2 sum_nm a_jn a_jm exp(-|w_n - w_m| / D_j),  a_jn = weight_j / N dI_jn / dX
 
-A flight for the quantile z standard deviations below the mean pays a toll for each slot, by which
-V falls to first order: its own a_jn times the sum over all others at their places before.
+Where z standard deviations less arrive than in the mean, the shadowing that is expected at a place
+w is X_j = -z sigma_j^2 sum_n a_jn exp(-|w - w_n| / D_j) / sqrt(V). Flights that are better under it
+stay less about one place.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.problem import Problem
+from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.solution import Solution
 from faao_mav.radio.spline import Spline
 
@@ -36,19 +37,19 @@ _TINY = 1e-12
 """A rate, bit/s/Hz, and a variance that count as none."""
 
 _CELLS = 64
-"""Points along each side of the map of a toll, at most. Chosen."""
+"""Points along each side of the map of that shadowing. Chosen."""
 
 _PLACES = 1000
-"""Places of the flight before that make a toll, at most. Chosen."""
+"""Places of the flight of which it is the sum, at most. Chosen."""
 
 _ROUND = 0.25
-"""Part of D over which the correlation of a toll is rounded at its peak. Chosen."""
+"""Part of D over which its correlation is rounded at its peak. Chosen."""
 
 
 Rates: TypeAlias = Callable[[float], Real]
 """The rates of both hops (2, n), bits, where all gains are so many dB above the law."""
 
-TOLLS = (0.25, 0.5, 0.9, 1.4)
+SHADES = (0.25, 0.5, 0.9, 1.4)
 """Standard deviations below the mean that flights are sought for. Chosen: of copters over 100 to
 400 m, with 6 dB and D of 25 and 50 m, the best at nine of ten is the third, in the mean the first
 or none."""
@@ -141,12 +142,12 @@ def under_shadowing(problem: Problem, w: Real, rates: Rates) -> Shadowed:
     return Shadowed(quantiles[asked[0]] if asked else mean, mean, quantiles, arrived)
 
 
-def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> Stage:
-    """Return `stage` with the toll of a flight at w (n, 2) for z standard deviations.
+def shaded(problem: Problem, field: RateField, w: Real, z: float) -> RateField:
+    """Return `field` under the shadowing that is expected where z standard deviations less arrive.
 
-    That is a factor of each slot times what a map of the places of that flight rises from there.
+    That is less than in the mean of a flight at w (n, 2).
     """
-    now, slopes = rates(0.0), rates(0.5) - rates(-0.5)
+    now, slopes = field.value(w.T), field.value(w.T, 0.5) - field.value(w.T, -0.5)
     parts = ([[1], [1]], [[0.99], [1]], [[1], [0.99]])
     most, *less = (arriving(problem, now * np.array(part))[-1] / len(w) for part in parts)
     lost = np.maximum(_TINY, most - np.array(less))
@@ -154,24 +155,16 @@ def tolled(problem: Problem, stage: Stage, w: Real, rates: Rates, z: float) -> S
     radio, every = problem.plan.radio, -(-len(w) // _PLACES)
     far = 2 * max(law.correlation_m for law in radio.gain_laws)
     x, y = (np.linspace(each.min() - far, each.max() + far, _CELLS) for each in w.T)
-    maps, variance = [], _TINY
+    felt, variance = [], _TINY
     for law, spread, each in zip(radio.gain_laws, radio.spreads, a, strict=True):
         rounded = max(_ROUND * law.correlation_m, x[1] - x[0], y[1] - y[0])
         away = np.hypot(x[:, None, None] - w[::every, 0], y[:, None] - w[::every, 1])
-        felt = np.exp(-np.hypot(away, rounded) / law.correlation_m) @ each[::every]
-        maps.append(Spline.through(x, y, every * spread**2 * felt))
-        variance += float(each @ maps[-1].value(*w.T))
-    before = np.stack([each.value(*w.T) for each in maps])
-    factors = z * slopes / np.sqrt(variance)
-
-    def less_its_toll(w: Real) -> StageValues:
-        at = stage(w)
-        value, gradient, hessian = at.value.copy(), at.gradient.copy(), at.hessian.copy()
-        for j, each in enumerate(maps):
-            f, f_x, f_y, f_xx, f_xy, f_yy = each.by_both(w[0], w[1])
-            value[j] = np.maximum(0.0, value[j] - factors[j] * (f - before[j]))
-            gradient[:, j] -= factors[j] * np.stack([f_x, f_y])
-            hessian[:, j] -= factors[j] * np.stack([f_xx, f_xy, f_yy])
-        return StageValues(value, gradient, hessian)
-
-    return less_its_toll
+        sums = np.exp(-np.hypot(away, rounded) / law.correlation_m) @ each[::every]
+        felt.append(every * spread**2 * sums)
+        variance += float(each @ Spline.through(x, y, felt[-1]).value(*w.T))
+    links = []
+    for link, each in zip(field.links, felt, strict=True):
+        above = 0.0 if link.gains.above is None else link.gains.above.value(x[:, None], y)
+        shade = Spline.through(x, y, above - z / np.sqrt(variance) * each)
+        links.append(replace(link, gains=replace(link.gains, above=shade)))
+    return replace(field, links=tuple(links))

@@ -15,8 +15,9 @@ from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
 from faao_mav.optimizer.rates.field import SlotRate, rate_field
 from faao_mav.optimizer.rates.table_rate import TableRate, kind_of, table_rates
-from faao_mav.optimizer.shadowing import outcomes, shadowed, shadows, tolled
+from faao_mav.optimizer.shadowing import outcomes, shaded, shadowed, shadows
 from faao_mav.optimizer.solution import Solution
+from faao_mav.radio.gain import PER_DB
 
 FARTHEST = 400.0
 
@@ -177,23 +178,21 @@ def test_the_smaller_of_two_normal_rates(small_plan: MakePlan) -> None:
     assert np.quantile(found, 0.5) == pytest.approx(2 - 0.6 * 0.5449, abs=0.05)
 
 
-def test_a_toll_is_as_steep_as_the_variance(small_plan: MakePlan) -> None:
-    """To first order, of a few slots that move, and with slopes as differences have them."""
-    plan = small_plan(SPREAD)
+def test_a_shade_is_the_field_that_is_expected_where_less_arrives(small_plan: MakePlan) -> None:
+    """Of fields that are drawn: -z cov(X, S) / sd(S), with S what arrives."""
+    plan = small_plan(SPREAD | {"radio.gain": {"spread_db": 0.1, "correlation_m": 25}})
     problem = build_problem(plan)
     field = rate_field(problem, design(plan))
     n = problem.kinematics.slots
     w = np.stack([np.linspace(0, 50, n), 50 - np.linspace(0, 50, n) ** 2 / 50], axis=1)
-    stage = tolled(problem, field, w, lambda db: field.value(w.T, db), 1.3)
-    base, at, h = field(w.T), stage(w.T), 1e-3
-    np.testing.assert_allclose(at.value, base.value, atol=1e-9)
-    for axis in (0, 1):
-        move = h * np.eye(2)[axis][:, None]
-        up, down = stage(w.T + move), stage(w.T - move)
-        slope = (up.value - down.value) / (2 * h)
-        np.testing.assert_allclose(at.gradient[axis], slope, atol=1e-6)
-        bend = (up.gradient[axis] - down.gradient[axis]) / (2 * h)
-        np.testing.assert_allclose(at.hessian[2 * axis], bend, atol=1e-5)
+    X = 10 * np.array(list(shadows(problem, w, 3000)))
+    S = outcomes(problem, w, lambda db: field.value(w.T, db), 3000)[:, -1]
+    less = shaded(problem, field, w, 1.3)
+    for hop, (link, plain) in enumerate(zip(less.links, field.links, strict=True)):
+        expected = -1.3 * ((S - S.mean()) @ X[:, hop]) / len(S) / S.std()
+        found = 10 * (link.gains.log(w.T) - plain.gains.log(w.T)) / PER_DB
+        np.testing.assert_allclose(found, expected, atol=0.2)
+        assert (found.min() < -0.6) == (hop == 1)  # the one that limits
 
 
 def under_drawn_fields(solution: Solution, count: int = 1000) -> Real:
