@@ -7,7 +7,6 @@ reached. The optimiser sees steps that rise over some decibels; what is priced a
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -44,11 +43,9 @@ class StreamRate(ABC):
         """Return which step an SNR (...), linear, has: 1 is the lowest, 0 none."""
         return np.zeros(np.shape(snr), dtype=np.int_)
 
-    def widened(self, width: float) -> Self:  # noqa: ARG002
+    def widened(self, width: float, *, above: bool = False) -> Self:  # noqa: ARG002
         """Return it as it is seen with steps that rise over `width` dB."""
         return self
-
-    above = widened
 
 
 @dataclass(frozen=True)
@@ -81,18 +78,10 @@ class RateSteps(StreamRate):
         """The highest rate, bit/s/Hz."""
         return self.rates[-1]
 
-    @cached_property
-    def gap(self) -> float:
-        """The largest distance of two steps, dB; 0 of one."""
-        return max(np.diff(self.snr_db), default=0.0)
-
-    def widened(self, width: float) -> "RateSteps":
-        """Return steps that rise over `width` dB."""
-        return replace(self, width=width)
-
-    def above(self, width: float) -> "RateSteps":
-        """Return steps that rise over `width` dB and are nowhere below these."""
-        return replace(self, snr_db=tuple(snr - width / 2 for snr in self.snr_db), width=width)
+    def widened(self, width: float, *, above: bool = False) -> Self:
+        """Return steps that rise over `width` dB, or so much earlier: nowhere below these."""
+        snr_db = tuple(snr - above * width / 2 for snr in self.snr_db)
+        return replace(self, snr_db=snr_db, width=width)
 
     def number(self, snr: Real) -> Integers:
         """Return which step an SNR (...), linear, has: 1 is the lowest, 0 none."""

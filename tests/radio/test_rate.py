@@ -133,7 +133,7 @@ def test_steps_and_what_rises_about_them(rows: list[tuple[float, float]], width:
         had = [r for s, r in rows if s <= 10 * np.log10(snr)]
         assert had_there == max(had, default=0.0)
     assert steps.most == max(rates)
-    smooth, above = steps.widened(width).value(SNR), steps.above(width).value(SNR)
+    smooth, above = steps.widened(width).value(SNR), steps.widened(width, above=True).value(SNR)
     assert (np.diff(smooth) >= -1e-12).all()
     assert (above >= value - 1e-12).all()
     step = np.diff(np.log10(SNR))[0] * 10

@@ -77,7 +77,7 @@ def best_at(problem: Problem, link: Link, gain_log: Real) -> tuple[Real, bool]:
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
     exact = link.closed_form and link.measure == "cutoff"
     if link.steps is not None:
-        link = replace(link, steps=link.steps.above(_WIDTH))
+        link = replace(link, steps=link.steps.widened(_WIDTH, above=True))
     slots, gain_log = len(gain_log), gain_log.T
     if link.nlos is not None and not optimal.averaged:
         singular = _largest_singular_values(link, slots)
