@@ -11,6 +11,7 @@ import numpy as np
 from faao_mav.errors import FaaoError, counted
 from faao_mav.fly.logs import read_log
 from faao_mav.optimizer.solution import Solution
+from faao_mav.plan.radio import STATIONS
 from faao_mav.radio.gain import PER_DB
 from faao_mav.radio.measured import SIK_STEP
 from faao_mav.report.summary import Line, beside
@@ -116,13 +117,10 @@ class FromLog:
         yield from _debriefing_lines(self.found)
         told = self.as_dict()
         if radio := told["radio"]:
-            yield (
-                "radio",
-                f"{counted(radio['levels'], 'level')} of a telemetry radio: their shape is "
-                f"{radio['base_station_db']:.1f} dB rms from the planned gain of the base station, "
-                f"{radio['ground_user_db']:.1f} of the ground user; "
-                "faao-mission link fits a law to them",
-            )
+            text = f"{counted(radio['levels'], 'level')} of a telemetry radio: their shape is "
+            text += f"{radio['base_station_db']:.1f} dB rms from the planned gain of the base "
+            text += f"station, {radio['ground_user_db']:.1f} of the ground user"
+            yield "radio", f"{text}; faao-mission link fits a law to them"
         if len(self.records) > 1:
             others = ", ".join(str(r.system) for r in self.records if r is not self.record)
             yield "vehicle", f"system {told['system']}, by its flight; also in the log: {others}"
@@ -158,14 +156,10 @@ class FromLog:
         told = np.isfinite(self.record.rssi) & (flight.t >= 0) & (flight.t < plan.flight.duration)
         if not told.any():
             return None
-        w, level = flight.w[told], self.record.rssi[told] * SIK_STEP
-        found: dict[str, Any] = {"levels": int(told.sum())}
-        for name, link, station in zip(
-            ("base_station_db", "ground_user_db"),
-            solution.problem.links,
-            plan.radio.stations,
-            strict=True,
-        ):
-            gains = replace(link.gains, station=station.at(flight.t[told]))
-            found[name] = float(np.std(level - gains.log(w.T) / PER_DB))
+        t, w, level = flight.t[told], flight.w[told], self.record.rssi[told] * SIK_STEP
+        found: dict[str, Any] = {"levels": len(level)}
+        links = zip(STATIONS, solution.problem.links, plan.radio.stations, strict=True)
+        for name, link, station in links:
+            gains = replace(link.gains, station=station.at(t))
+            found[f"{name}_db"] = float(np.std(level - gains.log(w.T) / PER_DB))
         return found
