@@ -1,5 +1,6 @@
 """Levels of a link that were measured in flight: their units, and tables of them (CSV)."""
 
+import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -89,8 +90,11 @@ def read_measured(
     between = max(";\t,", key=lines[0].count)
     if between == ";":
         lines[1:] = [line.replace(",", ".") for line in lines[1:]]
-    rows = (line.replace('"', "").split(between) for line in lines)
-    return measured_in(path, next(rows), [*rows], station, units, calibration)
+    try:
+        header, *rows = csv.reader(lines, delimiter=between)
+    except csv.Error as error:
+        raise InputError(f"{path}: {error}; expected rows of numbers") from None
+    return measured_in(path, header, rows, station, units, calibration)
 
 
 def measured_in(
