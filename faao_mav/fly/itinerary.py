@@ -166,8 +166,7 @@ class Gate:
         self._fence, self._speed = plan.keep_in, plan.max_ground_speed
         self._acceleration = plan.vehicle.max_acceleration
         self._on_course: float | None = None
-        self._last: tuple[float, Real] | None = None
-        self._jumped_from: tuple[float, Real] | None = None
+        self._believed: tuple[float, Real] | None = None
         self._moved, self._doubted_since = 0.0, math.inf
         self.has_lost_it = False
         """Whether its places have been doubted for too long."""
@@ -194,16 +193,14 @@ class Gate:
 
         After a jump it is doubted until it jumps back; so is one that moves and stays where it is.
         """
-        last, self._last = self._last, (t, place)
-        if last is None or np.linalg.norm(velocity) < _MOVES or (place != last[1]).any():
+        since, before = self._believed or (t, place)
+        if self._believed is None or np.linalg.norm(velocity) < _MOVES or (place != before).any():
             self._moved = t
-        if last is not None and self._jumps(last, t, place):
-            if self._jumped_from is None:
-                self._jumped_from = last
-            elif not self._jumps(self._jumped_from, t, place):
-                self._jumped_from = None
         stands = t - self._moved >= _STANDS
-        doubted = stands or self._jumped_from is not None
+        within = _AROUND + _QUICKER * self._speed * (t - since)
+        doubted = stands or np.linalg.norm(place - before) > within
+        if not doubted:
+            self._believed = t, place
         if doubted and self._doubted_since == math.inf:
             self._doubted_since = t
             why = "does not change, though it moves" if stands else "has jumped"
@@ -214,19 +211,12 @@ class Gate:
         self.has_lost_it = t >= self._doubted_since + _BORNE
         return not doubted
 
-    def _jumps(self, before: tuple[float, Real], t: float, place: Real) -> bool:
-        within = _AROUND + _QUICKER * self._speed * (t - before[0])
-        return float(np.linalg.norm(place - before[1])) > within
-
 
 def _lag(seconds: float, speed: float, acceleration: float) -> float:
     """Return the greatest lag, m, of an aircraft that was on course so many seconds ago.
 
     One that stays where it is falls behind by at most the speed; one that follows from rest, by
     the way that it takes to be as fast.
-
-    >>> _lag(0.5, 8.0, 2.0), _lag(60.0, 8.0, 2.0)
-    (4.0, 16.0)
     """
     return min(speed * max(seconds, 0.0), speed**2 / (2 * acceleration))
 

@@ -270,21 +270,14 @@ class Flight:
         comes_back = guided and self.mode != self.asked_mode
         if comes_back:
             self.mode = self.asked_mode
-        flies = self.rules.takes_off_by_setpoints or self.aircraft.flies(now)
-        aim = self.aim(message)
+        m, flies = message, self.rules.takes_off_by_setpoints or self.aircraft.flies(now)
+        rows = [m.y, m.x, -m.z], [m.vy, m.vx, -m.vz], [m.afy, m.afx, -m.afz]
+        aim = np.array(rows, dtype=float)  # east, north and up of home
         if guided and flies and (np.abs(aim) < _FARTHEST).all():
+            aim[0, :2] = self._frame.to_local(*self._own_frame.to_geodetic(aim[0, :2]))
             carries_on = self.rules.carries_on
             self.aircraft.pursue(now, aim, self.vehicle.top_airspeed, carries_on=carries_on)
         return comes_back
-
-    def aim(self, message: SetPositionTargetLocalNed) -> Real:
-        """Return what `message` says, (3, 3), in metres east, north and up of home."""
-        m = message
-        rows = [m.y, m.x, -m.z], [m.vy, m.vx, -m.vz], [m.afy, m.afx, -m.afz]
-        aim = np.array(rows, dtype=float)
-        if (np.abs(aim) < _FARTHEST).all():
-            aim[0, :2] = self._frame.to_local(*self._own_frame.to_geodetic(aim[0, :2]))
-        return aim
 
     def lose_setpoints(self, now: float) -> None:
         """Do what is to be done when setpoints have ceased, if they have."""

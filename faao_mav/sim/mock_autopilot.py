@@ -260,12 +260,6 @@ class MockAutopilot(Machine[None]):
                 custom = flags > 0 and flags & _CUSTOM_MODE
                 mode = self.behaviour.requested_mode(main, sub) if custom else None
                 return self.behaviour.no_mode if mode is None else self._set_mode(mode)
-            case MavCommand.SET_CURRENT:
-                number = whole(command.param1)
-                if number not in range(len(self.lists.items(MissionType.MISSION))):
-                    return _DENIED
-                self._current = number
-                answers.append(self._mission_current())
             case MavCommand.REQUEST_MESSAGE:
                 answers += self._asked_for(whole(command.param1))
                 return _ACCEPTED if answers else _UNSUPPORTED

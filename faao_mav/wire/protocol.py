@@ -89,7 +89,6 @@ class MavCommand(IntEnum):
 
     TAKEOFF = 22
     SET_MODE = 176
-    SET_CURRENT = 224
     REBOOT = 246
     START = 300
     ARM = 400

@@ -40,7 +40,7 @@ from faao_mav.sim.faults import Faults
 from faao_mav.wire import messages, protocol
 from faao_mav.wire.jobs import Held
 from faao_mav.wire.machine import AT_ONCE, Script, Talk
-from faao_mav.wire.messages import CommandLong, Envelope, Heartbeat, Message
+from faao_mav.wire.messages import CommandLong, Envelope, Heartbeat, Message, ParamSet
 from faao_mav.wire.parameters import Reading
 from faao_mav.wire.protocol import GROUND_STATION, Address, MavCommand, MissionType
 from faao_mav.wire.wire_items import wire_items
@@ -120,6 +120,7 @@ MODES: dict[str, dict[str, int]] = {
         "land": 4 << 16 | 6 << 24,
     },
 }
+TIMED = {"ardupilot": {"WPNAV_ACCEL": 250.0}, "px4": {"MPC_ACC_HOR": 3.0}}
 ORDERS: dict[str, tuple[int, float]] = {
     "arm": (MavCommand.ARM, 1.0),
     "disarm": (MavCommand.ARM, 0.0),
@@ -154,6 +155,7 @@ def harmless(message: Message) -> bool:
 
 
 PICKED: dict[str, Picks] = {
+    "all": lambda _: True,
     "arm": lambda message: arms(message, 1.0),
     "disarm": lambda message: arms(message, 0.0),
     "start": starts,
@@ -186,9 +188,8 @@ def held_by(mock: MockAutopilot, untold: Collection[str] = ()) -> Held:
 class Scene:
     """A mock autopilot that holds a mission, and a watch of it on a simulated link.
 
-    `flight` is what is asked for beside that mission, for which the mock may not be ready; with a
-    `solution` that is flown by setpoints. `events` happen at their times, s, with `others` on the
-    link, which has `faults`. What is sent is judged by `client`.
+    With a `solution` that is flown by setpoints. `events` happen at their times, s, with `others`
+    on the link, which has `faults`. What is sent is judged by `client`.
     """
 
     def __init__(
@@ -199,7 +200,6 @@ class Scene:
         arm: bool = False,
         lands: bool = True,
         solution: Solution | None = None,
-        flight: Flight | None = None,
         elsewhere: bool = False,
         **options: Any,
     ) -> None:
@@ -210,7 +210,8 @@ class Scene:
         self.home = options.setdefault("home", HOME)
         self.mock: Any = holding(mission, MockAutopilot(behaviour, **options))
         self.mock.flight._fly = fly
-        flight = flight or Flight(mission, solution=solution, streamed=solution is not None)
+        timed = Vehicle(kind, "copter", TIMED[kind])
+        flight = Flight(mission, timed, solution=solution, streamed=solution is not None)
         gate = Clearance(flight, peer_of(kind), held_by(self.mock), elsewhere)
         self.watch: Any = Stream(gate) if solution else Watch(gate, arm=arm, lands=lands)
         self.kind, self.solution, self.faults, self.until = kind, solution, Faults(), 300.0
@@ -274,7 +275,7 @@ class Scene:
 
         self.mock.on = hear
 
-    def _event(self, word: str, number: str = "0") -> Callable[[float], object]:
+    def _event(self, word: str, *words: str) -> Callable[[float], object]:
         """Return what happens at a time: it is called with that."""
         mock, part = self.mock, MissionType.MISSION
         rows = list(mock.lists.items(part))
@@ -287,6 +288,15 @@ class Scene:
                 return lambda now: mock.reboot(now)
             case "carried":
                 return lambda _: setattr(mock, "home", away(60.0))
+            case "current":
+                return lambda _: setattr(mock, "_current", int(words[0]))
+            case "parameter":
+                message = ParamSet(VEHICLE, words[0], float(words[1]), 9)
+                return lambda now: mock.on(Envelope(GROUND_STATION, message), now)
+            case "answer":  # to an order of ours, or of another station
+                to = FOREIGN if "other" in words else GROUND_STATION
+                answer = messages.CommandAck(to, ORDERS[words[0]][0], int(words[1]))
+                return lambda now: self.client.on(Envelope(VEHICLE, answer), now)
             case "shorten":
                 rows = rows[:-2]
             case "change":  # an item of its mission
@@ -295,13 +305,12 @@ class Scene:
                 part = MissionType.RALLY
                 rows = [*wire_items(a_mission(5, rally=RALLY), part, vehicle_of(self.kind))]
             case _:  # somebody else gives an order, or the pilot sets a mode
-                orders = ORDERS | {"current": (MavCommand.SET_CURRENT, float(number))}
-                message: Message = (
-                    CommandLong(VEHICLE, orders[word][0], 0, orders[word][1])
-                    if word in orders
+                order: Message = (
+                    CommandLong(VEHICLE, ORDERS[word][0], 0, ORDERS[word][1])
+                    if word in ORDERS
                     else messages.SetMode(1, 1, MODES[self.kind][word])
                 )
-                return lambda now: mock.on(Envelope(FOREIGN, message), now)
+                return lambda now: mock.on(Envelope(FOREIGN, order), now)
         return lambda _: mock.lists.replace(part, rows)
 
 
@@ -515,6 +524,9 @@ def staged(flies: str, kind: str, given: Mapping[str, str], happens: str = "") -
         scene.mock.flight.aircraft.landed = lambda _: False
     if "unwell" in given:
         scene.mock._why_not_armed = lambda: "Compass not healthy"
+    if "keeps-armed" in given:
+        arm = scene.mock._arm
+        scene.mock._arm = lambda wanted: arm(True) if wanted else 4
     if "not-flyable" in given:
         scene.mock._flyable = lambda: None
     if "refuses" in given:

@@ -22,9 +22,9 @@ from typing import Any
 
 import pytest
 from conftest import FLYABLE, edited
-from scenes import DATA, Scene, away, held_by, holding
+from scenes import DATA, away, held_by, holding
 from served import vehicle
-from stations import FENCE, HOME, RALLY, VEHICLE, a_mission, mock_of, peer_of
+from stations import FENCE, HOME, RALLY, a_mission, mock_of, peer_of
 from typer.testing import CliRunner, Result
 
 from faao_mav import parse_plan, plan_mission
@@ -39,8 +39,8 @@ from faao_mav.mission.formats import PlanTarget, render_mission
 from faao_mav.sim import MockAutopilot
 from faao_mav.validate import Finding, Level
 from faao_mav.wire import upload
-from faao_mav.wire.messages import Envelope, Heartbeat, ParamSet, SysStatus
-from faao_mav.wire.protocol import GROUND_STATION, MissionType
+from faao_mav.wire.messages import Heartbeat, SysStatus
+from faao_mav.wire.protocol import MissionType
 from faao_mav.wire.transfer import PartReport
 from faao_mav.wire.whereabouts import Whereabouts
 
@@ -163,20 +163,6 @@ def test_a_plan_tells_what_the_flight_takes_of_the_battery() -> None:
     slow = holding(conversion.mission, mock_of("ardupilot"))
     assert errors(found(flight, slow, {})) >= {"timing-other"}
     assert errors(found(flight, slow, {"untimed": ""})) == set()
-
-
-@pytest.mark.parametrize("kind", ["ardupilot", "px4"])
-def test_a_parameter_that_is_changed_before_it_is_armed_counts(kind: str) -> None:
-    name, value = {"ardupilot": ("WPNAV_ACCEL", 250.0), "px4": ("MPC_ACC_HOR", 3.0)}[kind]
-    flight = Flight(a_mission(12), Vehicle(kind, "copter", {name: value}))
-    scene = Scene(kind, flight=flight, arm=True)
-
-    def change(now: float) -> None:
-        scene.mock.on(Envelope(GROUND_STATION, ParamSet(VEHICLE, name, 2 * value, 9)), now)
-
-    assert scene.run([(1.5, change)]) == "refused"
-    assert scene.orders == []
-    assert f"{name} is {2 * value:g}, not {value:g}" in scene.watch.outcome.text
 
 
 # ---- from the command line

@@ -8,13 +8,14 @@ A line of `tests/data/fly/scenes.txt` has three parts between bars. The first na
   `both` kinds or one;
 - parameters NAME=VALUE; options of the mock, `home=EAST,HIGHER` in metres; faults of the link, of
   which `loss` may have several values; `until`, s;
-- `refuses`: the start is denied; `stays-armed`: it does not disarm when it lands; `unwell`: it
-  does not arm; `not-flyable`: it does not start; `elsewhere`.
+- `refuses`: the start is denied; `stays-armed`: it does not disarm when it lands, `keeps-armed`:
+  nor when asked; `unwell`: it does not arm; `not-flyable`: it does not start; `elsewhere`.
 
 The second tells what happens at a time or in a time, s: somebody else sets a mode or gives an
-order, packets are `silence`, some messages are lost (`loses`) or only their answers (`mutes`), all
-that the vehicle says waits for the end of a `hold-up`, it denies arming (`unready`), tells the item
-under way late (`lag`) or no mode (`modeless`), positions are changed. The third has the kind of the
+order, it hears the `answer` to one, a `parameter` is set, packets are `silence`, some messages are
+lost (`loses`) or only their answers (`mutes`), all that the vehicle says waits for the end of a
+`hold-up`, it denies arming (`unready`), tells the item under way late (`lag`) or no mode
+(`modeless`), positions are changed. The third has the kind of the
 ending, "-" for none, and what holds then: what was told (`says`), the ending's `text`, the gate's
 findings (`finds`), modes, orders; `quiet`: nothing that moves it is sent from then on, `unmoved`:
 no setpoint; `cancelled`: the last word ends a transfer. Nothing is sent in any scene that its
@@ -28,11 +29,11 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import DATA, MODES, ORDERS, Scene, arms, is_setpoint, staged, starts
-from stations import FOREIGN, VEHICLE
+from stations import VEHICLE
 from trials import flown
 
-from faao_mav.wire.messages import CommandAck, CommandLong, Envelope, MissionAck
-from faao_mav.wire.protocol import GROUND_STATION, MavCommand, MavResult, MissionType
+from faao_mav.wire.messages import CommandLong, MissionAck
+from faao_mav.wire.protocol import MavCommand, MavResult
 
 
 def rows() -> Iterator[Any]:
@@ -128,47 +129,10 @@ def test_in_no_trouble_what_must_not_happen_does(seed: int) -> None:
 
 # ---- what no words of scenes say
 
-DISARM = (MavCommand.ARM, 0.0)
-
-
-def test_a_late_answer_to_arming_is_none_to_disarming() -> None:
-    scene = staged("mission", "ardupilot", {"refuses": ""}, "0-10 loses disarm")
-
-    def answer(now: float) -> None:
-        ack = CommandAck(GROUND_STATION, MavCommand.ARM, 0)
-        scene.client.on(Envelope(VEHICLE, ack), now)
-
-    assert scene.run([(3.0, answer), (3.1, answer)]) == "refused"
-    assert not scene.mock.armed
-
-
-def test_what_refuses_to_disarm_is_told_as_armed() -> None:
-    scene = staged("mission", "px4", {"refuses": ""})
-    arm = scene.mock._arm
-    scene.mock._arm = lambda wanted: arm(True) if wanted else 4
-    assert scene.run() == "refused"
-    assert "it may still be armed: it answers ARM with FAILED" in scene.watch.outcome.text
-    assert scene.commands.count(DISARM) == 5
-
-
-def test_a_mission_that_changes_while_it_is_started_is_disarmed() -> None:
-    scene = Scene("px4", arm=True)
-    rows = scene.mock.lists.items(MissionType.MISSION)
-
-    def changes(message: object) -> bool:
-        """Hold another mission as soon as it is armed, and say nothing to the start."""
-        if starts(message):
-            scene.mock.lists.replace(MissionType.MISSION, rows[:-1])
-        return starts(message)
-
-    scene.loses(changes)
-    assert scene.run() == "changed"
-    assert not scene.mock.armed
-
 
 def test_an_interrupt_while_an_order_is_given_takes_it_back() -> None:
     """Ctrl-C comes anywhere: here between the order to arm, or to start, and its sending."""
-    for ordered, then in ((arms, [DISARM]), (starts, [(MavCommand.SET_MODE, 1.0)])):
+    for ordered, then in ((arms, [ORDERS["disarm"]]), (starts, [(MavCommand.SET_MODE, 1.0)])):
         scene = Scene("ardupilot", arm=True)
         said = scene.watch._said
 
@@ -183,13 +147,3 @@ def test_an_interrupt_while_an_order_is_given_takes_it_back() -> None:
             scene.run()
         orders = [each for each in scene.watch.cancel(100.0) if isinstance(each, CommandLong)]
         assert [(each.command, each.param1) for each in orders] == then
-
-
-def test_what_is_answered_to_another_station_is_no_answer() -> None:
-    scene = staged("mission", "px4", {"until": "12"}, "0-5 loses arm")
-
-    def answer(now: float) -> None:
-        scene.client.on(Envelope(VEHICLE, CommandAck(FOREIGN, MavCommand.ARM, 4)), now)
-
-    assert scene.run([(4.0, answer)]) == "-"
-    assert scene.mock.armed

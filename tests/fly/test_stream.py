@@ -106,16 +106,6 @@ def test_what_others_asked_tells_nothing_of_the_link() -> None:
     assert clock.lead == pytest.approx(0.2)
 
 
-def test_the_finish_is_asked_for_until_its_failsafe_is_over() -> None:
-    """The link breaks as setpoints end, and PX4 goes into its failsafe: it lands all the same."""
-    scene = Scene("px4", solution=under({}), parameters={"COM_OBL_RC_ACT": 5})
-    watch = scene.watch
-    scene.loses(lambda _: watch.phase == "ending", end=60.0)
-    assert scene.run() == "finished"
-    assert scene.watch.seen.fixes[-1].t > 60.0
-    assert not scene.mock.armed
-
-
 # ---- the gate of setpoints, and the ways back
 
 PLACES = st.tuples(st.floats(-60, 60), st.floats(-60, 60), st.floats(-40, 40)).map(np.array)
