@@ -1,10 +1,9 @@
 """A mock autopilot on a real link, which may be a bad one: what it does to packets, from a seed."""
 
-import heapq
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import count
+from operator import itemgetter
 from random import Random
 
 from faao_mav.sim.mock_autopilot import MockAutopilot
@@ -69,9 +68,9 @@ class FaultyTransport:
     def __init__(self, inner: Transport, faults: Faults) -> None:
         self._inner, self.listens = inner, inner.listens
         self._in, self._out = Channel(faults, "in"), Channel(faults, "out")
-        self._order, self._started = count(), time.monotonic()
-        self._under_way: list[tuple[float, int, bool, bytes, Origin | None]] = []
-        """When it arrives, its number, whether it goes out, the packet, and where from or to."""
+        self._started = time.monotonic()
+        self._under_way: list[tuple[float, bool, bytes, Origin | None]] = []
+        """When it arrives, whether it goes out, the packet, and where from or to."""
         self._arrived: list[tuple[bytes, Origin]] = []
 
     def read(self, timeout: float) -> list[tuple[bytes, Origin]]:
@@ -101,13 +100,13 @@ class FaultyTransport:
 
     def _push(self, channel: Channel, data: bytes, where: Origin | None) -> None:
         for when, arriving in channel.carry(data, self._now()):
-            item = (when, next(self._order), channel is self._out, arriving, where)
-            heapq.heappush(self._under_way, item)
+            self._under_way.append((when, channel is self._out, arriving, where))
+        self._under_way.sort(key=itemgetter(0))
 
     def _pass(self, now: float) -> None:
         """Hand over what arrives by `now`."""
         while self._under_way and self._under_way[0][0] <= now:
-            _, _, goes_out, data, where = heapq.heappop(self._under_way)
+            _, goes_out, data, where = self._under_way.pop(0)
             if goes_out:
                 self._inner.write(data, where)
             else:
