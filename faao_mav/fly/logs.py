@@ -27,30 +27,28 @@ if TYPE_CHECKING:
 Said: TypeAlias = tuple[int, int, str, Mapping[str, Any]]
 """System and component of MAVLink that said it, 0 in a vehicle's own log; name; values by field."""
 
-_PLACES = {
-    "POS": {"TimeUS": 1e6, "Lat": 1, "Lng": 1, "Alt": 1, "RelHomeAlt": 1},
-    "GLOBAL_POSITION_INT": {
-        "time_boot_ms": 1e3, "lat": 1e7, "lon": 1e7, "alt": 1e3, "relative_alt": 1e3,
-    },
-    "vehicle_global_position": {"timestamp": 1e6, "lat": 1, "lon": 1, "alt": 1},
+_TOLD = {
+    "POS": ("place", {"TimeUS": 1e6, "Lat": 1, "Lng": 1, "Alt": 1, "RelHomeAlt": 1}),
+    "GLOBAL_POSITION_INT": (
+        "place", {"time_boot_ms": 1e3, "lat": 1e7, "lon": 1e7, "alt": 1e3, "relative_alt": 1e3},
+    ),
+    "vehicle_global_position": ("place", {"timestamp": 1e6, "lat": 1, "lon": 1, "alt": 1}),
+    "home_position": ("home", {"alt": 1}),
+    "PARM": ("Name", {"Value": 1}),
+    "PARAM_VALUE": ("param_id", {"param_value": 1}),
+    "XKF2": ("wind", {"VWE": 1, "VWN": 1}),
+    "WIND_COV": ("wind", {"wind_y": 1, "wind_x": 1}),
+    "WIND": ("whence", {"direction": 1, "speed": 1}),
+    "wind": ("wind", {"windspeed_east": 1, "windspeed_north": 1}),
+    "RADIO_STATUS": ("radio", {"rssi": 1}),
+    "RADIO": ("radio", {"rssi": 1}),
+    "RAD": ("radio", {"RSSI": 1}),
+    "radio_status": ("radio", {"rssi": 1}),
 }  # fmt: skip
-"""Messages about positions, and what their fields count in a second, a degree and a metre: the
-time, latitude, longitude, the height above the sea and that above home."""
-
-_PARAMETERS = {"PARM": ("Name", "Value"), "PARAM_VALUE": ("param_id", "param_value")}
-_WINDS = {
-    "XKF2": ("VWE", "VWN"),
-    "WIND_COV": ("wind_y", "wind_x"),
-    "WIND": ("direction", "speed"),
-    "wind": ("windspeed_east", "windspeed_north"),
-}
-"""Messages about parameters and wind, and their fields: towards east and north, but of WIND whence,
-degrees, and how fast."""
-
-_RADIOS = {"RADIO_STATUS": "rssi", "RADIO": "rssi", "RAD": "RSSI", "radio_status": "rssi"}
-"""Messages of telemetry radios, and the field with the level that they count."""
-
-_ASKED = ["home_position", *_PLACES, *_PARAMETERS, *_WINDS, *_RADIOS]
+"""The messages that are read: what they tell, and what their fields count in a second, a degree and
+a metre. Of a place the time, latitude, longitude, the height above the sea and that above home; of
+the wind how fast it blows to east and north, or whence it blows, degrees, and how fast; of a
+telemetry radio the level. A parameter has its name in the field that is told first."""
 
 _UNKNOWN = 255  # The level of a radio that does not know it (MAVLink, RADIO_STATUS).
 
@@ -131,7 +129,7 @@ def flights(path: Path, said: Iterable[Said], system: int = 0) -> list[Flown]:
         if count == _MOST_MESSAGES:
             what = "positions, winds and parameters"
             raise InputError(f"{path}: more than {count:,} {what}; {expected}")
-        if name in _RADIOS and number:  # told by the radio itself, which has no place
+        if _TOLD[name][0] == "radio" and number:  # told by the radio itself, which has no place
             for each in heard.values():
                 each.hear(name, fields)
         else:
@@ -164,28 +162,26 @@ class _Heard:
 
     def hear(self, name: str, said: Mapping[str, Any]) -> None:
         """Take note of a message."""
-
-        def value(field: str) -> float:
-            found = said.get(field, math.nan)
-            return float(found) if isinstance(found, int | float) else math.nan
-
-        if name in _PLACES:
-            self._be(*(value(field) / unit for field, unit in _PLACES[name].items()))
-        elif name in _PARAMETERS:
-            key, field = _PARAMETERS[name]
-            if math.isfinite(value(field)):
-                self.parameters[str(said.get(key))] = value(field)
-        elif name in _RADIOS:
-            self._rssi = math.nan if value(_RADIOS[name]) == _UNKNOWN else value(_RADIOS[name])
-        elif name in _WINDS and not said.get("C", 0):  # the first of the estimators
-            east, north = map(value, _WINDS[name])
-            if name == "WIND":
-                angle, speed = math.radians(east), north
-                east, north = -speed * math.sin(angle), -speed * math.cos(angle)
-            if 0 < math.hypot(east, north) <= _FASTEST_WIND:  # one that does not run tells 0
-                self._wind = east, north
-        elif name == "home_position" and said.get("valid_alt", True):
-            self._home = value("alt")
+        what, units = _TOLD[name]
+        told = ((said.get(field), unit) for field, unit in units.items())
+        values = [x / unit if isinstance(x, int | float) else math.nan for x, unit in told]
+        match what:
+            case "place":
+                self._be(*values)
+            case "home":
+                self._home = values[0] if said.get("valid_alt", True) else self._home
+            case "radio":
+                self._rssi = math.nan if values[0] == _UNKNOWN else values[0]
+            case "wind" | "whence":
+                east, north = values
+                if what == "whence":
+                    angle, speed = math.radians(east), north
+                    east, north = -speed * math.sin(angle), -speed * math.cos(angle)
+                # One that does not run tells 0; the first of the estimators counts.
+                if 0 < math.hypot(east, north) <= _FASTEST_WIND and not said.get("C", 0):
+                    self._wind = east, north
+            case _ if math.isfinite(values[0]):
+                self.parameters[str(said.get(what))] = values[0]
 
     def _be(
         self, t: float, latitude: float, longitude: float, altitude: float, height: float = math.nan
@@ -233,7 +229,7 @@ def messages(path: Path) -> Iterator[Said]:
     except AttributeError:  # a log that ends in the first message of its kind
         log = mavutil.mavlogfile(str(path))  # which takes ten times as long
     with closing(log):
-        while (message := log.recv_match(type=_ASKED)) is not None:
+        while (message := log.recv_match(type=list(_TOLD))) is not None:
             sender = (0, 0) if own else (message.get_srcSystem(), message.get_srcComponent())
             yield *sender, message.get_type(), message.to_dict()
 
@@ -242,7 +238,7 @@ def _ulog(path: Path) -> Iterator[Said]:
     from pyulog import ULog
 
     with path.open("rb") as file:
-        log = ULog(file, _ASKED)
+        log = ULog(file, list(_TOLD))
     for name, value in log.initial_parameters.items():
         yield 0, 0, "PARM", {"Name": name, "Value": value}
     rows: list[tuple[float, str, dict[str, float]]] = []

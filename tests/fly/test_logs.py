@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from faao_mav.errors import FaaoError, InputError
 from faao_mav.fly import logs
-from faao_mav.fly.logs import _PLACES, Said, flights, messages, read_log
+from faao_mav.fly.logs import _TOLD, Said, flights, messages, read_log
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.plan import parse_plan
@@ -243,7 +243,7 @@ KINDS = ("POS", "GLOBAL_POSITION_INT", "vehicle_global_position")
 def position(name: str, k: int, height: float, home: float) -> Said:
     """Return what a message of the kind `name` says of the flight after `k` fifths of a second."""
     values = (100.0 + 0.2 * k, -35.0 + 1e-6 * k, 149.0, home + height, height)
-    fields = zip(_PLACES[name].items(), values, strict=False)
+    fields = zip(_TOLD[name][1].items(), values, strict=False)
     return 0, 0, name, {field: unit * value for (field, unit), value in fields}
 
 
