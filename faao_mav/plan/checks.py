@@ -77,19 +77,18 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
         "goal-power": energy and power is None,
         "battery-power": vehicle.battery is not None and power is None,
         "power-plane": vehicle.type == "plane" and power is not None and power.hover_w is not None,
+        "gusts": plan.max_airspeed <= vehicle.min_speed,
     }
     yield from (wrong(problem) for problem, there in found.items() if there)
 
 
 def _speeds(plan: PlanContents) -> Iterator[Problem]:
-    vehicle, flight, wind = plan.vehicle, plan.flight, _wind(plan)
-    if plan.max_airspeed <= vehicle.min_speed:
-        yield wrong("gusts", wind=wind)
+    vehicle, flight = plan.vehicle, plan.flight
     for end, velocity in (("start", flight.start_velocity), ("end", flight.end_velocity)):
         if velocity is None:
             continue
         speed, airspeed = math.hypot(*velocity), math.dist(velocity, plan.wind)
-        told: dict[str, Any] = {"end": end, "speed": speed, "airspeed": airspeed, "wind": wind}
+        told: dict[str, Any] = {"end": end, "speed": speed, "airspeed": airspeed}
         told["given"] = quote(list(velocity)) if any(velocity) else "hover"
         told["air"] = " through the air" if any(plan.wind) else ""
         if speed > plan.max_ground_speed:
@@ -99,12 +98,6 @@ def _speeds(plan: PlanContents) -> Iterator[Problem]:
             yield wrong("end-airspeed", default=default, **told)
         if airspeed < vehicle.min_speed:
             yield wrong("end-slow", **told)
-
-
-def _wind(plan: PlanContents) -> str:
-    wind = plan.site.wind
-    gusts = f", gusts of {wind.gust:g} m/s" if wind.gust > wind.speed else ""
-    return f"{wind.speed:g} m/s from {wind.from_degrees:g} degrees{gusts}"
 
 
 def _rates(plan: PlanContents) -> Iterator[Problem]:
@@ -196,7 +189,7 @@ def _distance(plan: PlanContents) -> Iterator[Problem]:
     most, limited = plan.max_airspeed, ""
     if most < math.inf:
         through = f"at most {most:.4g} m/s through the air (vehicle.max_airspeed)"
-        limited = f" in a wind of {_wind(plan)} and {through}"
+        limited = f" in a wind of {plan.site.wind} and {through}"
     yield wrong("too-short", distance=distance, takes=takes, limited=limited)
 
 

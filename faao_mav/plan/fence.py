@@ -10,7 +10,7 @@ from faao_mav.errors import InputError, PlanError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Circle, Fence, LatLon, Polygon
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Problem, wrong
-from faao_mav.plan.model import PlanContents, PlanFile
+from faao_mav.plan.model import PlanContents
 from faao_mav.plan.sections import CircleZone, FenceOptions, PolygonZone
 from faao_mav.vector import Vector
 
@@ -18,15 +18,15 @@ _SHORTER_WAY = 2e-3
 """By how much of its length a way may be longer than the shortest, which is found to 0.01 %."""
 
 
-def geofence(contents: PlanFile, source: str) -> Fence:
+def geofence(plan: PlanContents, source: str) -> Fence:
     """Return the zones of `fence` and of its file, which lies beside the plan's file `source`.
 
     Raises `PlanError` for a fence without zones and a file that cannot be read.
     """
-    options = contents.fence
+    options = plan.fence
     if options is None:
         return Fence()
-    frame = contents.site.origin.frame
+    frame = plan.origin.frame
     of_file = _read(options, source, frame)
     zones = [(zone, True) for zone in options.inclusion]
     zones += [(zone, False) for zone in options.exclusion]

@@ -1,21 +1,25 @@
 """How a section of `plan.yaml` is declared, and the types that its keys are read as.
 
-A section is a class, a key a field of it: its type, what it means, which numbers it may have in
-which unit, its default.
+A section is a class; a key is a field of it, with its type and, as the file says it, its default:
 
     @section
     class Flight:
-        duration: Number = key("Duration T.", "(0, 1e7] s")
+        duration: Number
+        time_step: Number = 0.2
 
-People write decibels and degrees; the plan holds watts, linear gains and local metres. What is
-accepted follows from the type and the interval (`keys.reference`) unless it is said in words.
+`keys.tsv` says what each key means, its name in the file if another than the field's, and which
+numbers it may have in which unit: `(0, 1e7] s`, where `(` leaves the lower end out. People write
+decibels and degrees; the plan holds watts, linear gains and local metres. What is accepted follows
+from type and interval (`keys.reference`) unless the table, or a text among the type's annotations,
+says it in words.
 """
 
 import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
 
 from pydantic import (
@@ -31,6 +35,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from faao_mav.files import table
 from faao_mav.geodesy import LocalFrame
 from faao_mav.vector import Vector
 
@@ -45,37 +50,28 @@ _INTERVAL = re.compile(r"([\[(])(\S+), (\S+)\] ?(.*)")
 
 _Section = TypeVar("_Section")
 
-
-def key(
-    description: str,
-    values: str = "",
-    accepted: str = "",
-    *,
-    name: str | None = None,
-    default: Any = MISSING,
-    default_factory: Any = MISSING,
-    **limits: Any,
-) -> Any:
-    """Declare a key: what it means, its interval and unit, and in words what is accepted.
-
-    `values` is `[0, 50] m/s`, with `(` where the lower end is not in it, or the unit alone. `name`
-    is the key's name in the file, if another than the field's; `limits` are more of pydantic's, as
-    `min_length`.
-    """
-    if found := _INTERVAL.fullmatch(values):
-        begins, low, high, values = found.groups()
-        limits |= {"gt" if begins == "(" else "ge": json.loads(low), "le": json.loads(high)}
-    said = {"description": description, "alias": name} | limits
-    said["json_schema_extra"] = {"unit": values, "accepted": accepted}
-    return field(default=default, default_factory=default_factory, metadata=said)
+_DECLARED = {(row["section"], row["field"]): row for row in table("plan/keys.tsv")}
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(key, field))
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def section(cls: type[_Section]) -> type[_Section]:
     """Make a class of keys a frozen dataclass that is read from a mapping of these keys alone."""
     made = dataclass(frozen=True, slots=True, kw_only=True)(cls)
-    return with_config(extra="forbid")(made)
+    for each in fields(made):  # type: ignore[arg-type]
+        if row := _DECLARED.get((cls.__name__, each.name)):
+            found, said = _INTERVAL.fullmatch(row["values"]), {"unit": row["values"]}
+            limits: dict[str, Any] = {}
+            if found:
+                begins, low, high, said["unit"] = found.groups()
+                limits = {"gt" if begins == "(" else "ge": json.loads(low), "le": json.loads(high)}
+            limits |= {"description": row["means"], "alias": row["key"] or None}
+            said["accepted"] = row["accepted"]
+            each.metadata = MappingProxyType({**limits, "json_schema_extra": said})
+    return with_config(extra="forbid", validate_default=True, defer_build=True)(made)
 
+
+DEFAULTS: Any = dict
+"""Makes a section of which the file says nothing: each key has its default."""
 
 Number: TypeAlias = Annotated[float, Strict(), AllowInfNan(False)]
 Whole: TypeAlias = Annotated[int, Strict()]
@@ -84,14 +80,6 @@ Flag: TypeAlias = Annotated[bool, Strict()]
 
 Text: TypeAlias = Annotated[str, Strict(), Field(pattern=r"^( |[^\p{C}\p{Z}])*$")]
 """Text in one line, without characters that move a terminal's cursor."""
-
-
-@dataclass(frozen=True, slots=True)
-class Written:
-    """How a value stands in the file: what is accepted there, and the plan's value as written."""
-
-    accepted: str | Callable[[], str]
-    convert: Callable[[Any], object] = lambda value: value
 
 
 def listed(words: Sequence[str], last: str = "or") -> str:
@@ -131,10 +119,6 @@ def dbm(power: float) -> float:
 def linear(db: float) -> float:
     """Return the linear gain of `db`: 10^(db / 10)."""
     return float(10 ** (db / 10))
-
-
-def _db(gain: float) -> float:
-    return 10 * math.log10(gain)
 
 
 def told(reason: str) -> PydanticCustomError:
@@ -214,12 +198,6 @@ def _velocity(value: object) -> Vector | None:
     return read_pair(value, "[east, north] in m/s")
 
 
-def _velocity_word(velocity: Vector | None) -> object:
-    if velocity is None:
-        return "free"
-    return velocity if any(velocity) else "hover"
-
-
 Problem: TypeAlias = tuple[str, dict[str, Any]]
 """What keys that do not agree have wrong: a row of `problems.tsv`, and the values said there."""
 
@@ -231,30 +209,20 @@ def wrong(row: str, **values: Any) -> Problem:
 
 PLACE = "[east, north] in metres or {latitude: degrees, longitude: degrees}"
 
-Position: TypeAlias = Annotated[Vector, PlainValidator(read_position), Written(PLACE)]
+Position: TypeAlias = Annotated[Vector, PlainValidator(read_position), PLACE]
 Velocity: TypeAlias = Annotated[
-    Vector | None,
-    PlainValidator(_velocity),
-    Written("hover, free or [east, north] in m/s", _velocity_word),
+    Vector | None, PlainValidator(_velocity), "hover, free or [east, north] in m/s"
 ]
 Power: TypeAlias = Annotated[
-    Number,
-    Field(ge=MIN_DBM, le=100),
-    AfterValidator(watts),
-    Written("a power from -200 to 100 dBm", dbm),
+    Number, Field(ge=MIN_DBM, le=100), AfterValidator(watts), "a power from -200 to 100 dBm"
 ]
 Noise: TypeAlias = Annotated[
-    Number,
-    Field(ge=-250, le=100),
-    AfterValidator(watts),
-    Written("a noise power from -250 to 100 dBm", dbm),
+    Number, Field(ge=-250, le=100), AfterValidator(watts), "a noise power from -250 to 100 dBm"
 ]
 Gain: TypeAlias = Annotated[
     Number,
     Field(ge=-200, le=0),
     AfterValidator(linear),
-    Written("a gain from -200 to 0 dB (1e-5, linear, is -50)", _db),
+    "a gain from -200 to 0 dB (1e-5, linear, is -50)",
 ]
-Antennas: TypeAlias = Annotated[
-    Whole, Field(ge=1, le=64), Written("a whole number of antennas, 1 to 64")
-]
+Antennas: TypeAlias = Annotated[Whole, Field(ge=1, le=64), "a whole number of antennas, 1 to 64"]

@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from faao_mav.plan.fields import Written, listed
-from faao_mav.plan.model import PlanFile
+from faao_mav.plan.fields import listed
+from faao_mav.plan.model import PlanContents
 
 POWER = "power_dbm"
 """The key of a study that stands for the powers of the base station and of the relay."""
@@ -49,31 +49,30 @@ def reference() -> Mapping[str, PlanKey]:
     >>> reference()["mission.max_items"].accepted
     'a whole number, 2 to 65535'
     """
-    return {key.path: key for key in _below(PlanFile, "")}
+    return {key.path: key for key in _below(PlanContents, "")}
 
 
 def _below(section: type, prefix: str) -> Iterator[PlanKey]:
     for field in fields(section):
+        if not field.init:
+            continue
         of: Any = field.type
         info = FieldInfo.from_annotated_attribute(of, field)
-        written = next((m for m in info.metadata if isinstance(m, Written)), Written(""))
-        in_file = written.accepted if isinstance(written.accepted, str) else written.accepted()
+        extra: Any = info.json_schema_extra or {"unit": "", "accepted": ""}
         path = prefix + (info.alias or field.name)
         inner = list(_sections(info.annotation))
         below = [key for one in inner for key in _below(one, f"{path}.")]
         names = (key.path.removeprefix(f"{path}.") for key in below)
         inside = tuple(name for name in names if "." not in name)
-        extra: Any = info.json_schema_extra or {"unit": "", "accepted": ""}
         required = info.is_required()
+        default = None if required or inside else info.get_default(call_default_factory=True)
         yield PlanKey(
             path,
             info.description or inner[0].__doc__.partition("\n")[0],
             extra["unit"],
-            ""
-            if required or inside
-            else _as_yaml(written.convert(info.get_default(call_default_factory=True))),
+            _as_yaml(default),
             required,
-            extra["accepted"] or in_file or _accepted(info, extra["unit"], inside),
+            extra["accepted"] or _accepted(info, extra["unit"], inside),
             inside,
             _choices(info.annotation),
         )
@@ -114,6 +113,9 @@ def _as_yaml(value: object) -> str:
 def _accepted(info: FieldInfo, unit: str, inside: tuple[str, ...]) -> str:
     """Return in words what type and limits of a key accept."""
     kind: Any = info.annotation
+    for said in info.metadata:  # by its type
+        if isinstance(said, str) or callable(said):
+            return said if isinstance(said, str) else listed(said())
     if inside:
         return f"a mapping with {', '.join(inside)}"
     if choices := _choices(kind):

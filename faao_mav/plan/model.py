@@ -7,19 +7,19 @@ lists them all.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.autopilot import Vehicle, VehicleType, vehicle_type
 from faao_mav.autopilot.body import Body
-from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.fence_area import Area, FreeArea, areas_of
-from faao_mav.plan.fields import Text, key, section
+from faao_mav.plan.fields import DEFAULTS, Text, section
 from faao_mav.plan.radio import Radio
 from faao_mav.plan.sections import (
     FenceOptions,
@@ -41,31 +41,23 @@ if TYPE_CHECKING:
 
 
 @section
-class PlanFile:
-    """What the file of a plan holds."""
-
-    name: Text = key(
-        "Name.", "", "one line of at most 200 printable characters", max_length=200, default=""
-    )
-    site: Site
-    vehicle: VehicleOptions
-    flight: Flight
-    radio: Radio
-    optimizer: Optimizer = field(default_factory=Optimizer)
-    goal: Goal = field(default_factory=Goal)
-    fence: FenceOptions | None = None
-    mission: MissionOptions = field(default_factory=MissionOptions)
-    study: Study | None = None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanContents(PlanFile):
+class PlanContents:
     """What a plan holds, and what follows from it; `reader.Plan` has its text besides.
 
     `geofence` has the zones of `fence` and of its file, in degrees.
     """
 
-    geofence: Fence = field(default_factory=Fence)
+    name: Annotated[Text, Field(max_length=200)] = ""
+    site: Site
+    vehicle: VehicleOptions
+    flight: Flight
+    radio: Radio
+    optimizer: Optimizer = field(default_factory=DEFAULTS)
+    goal: Goal = field(default_factory=DEFAULTS)
+    fence: FenceOptions | None = None
+    mission: MissionOptions = field(default_factory=DEFAULTS)
+    study: Study | None = None
+    geofence: Fence = field(init=False)
 
     @property
     def origin(self) -> Origin:
@@ -197,9 +189,7 @@ class PlanContents(PlanFile):
         return 8 * asked / (bandwidth * self.flight.duration)
 
 
-@lru_cache(maxsize=16)
-def _zones(fence: Fence, frame: LocalFrame) -> tuple[Area, ...]:
-    return areas_of(fence, frame)
+_zones = lru_cache(maxsize=16)(areas_of)
 
 
 @lru_cache(maxsize=16)
@@ -231,8 +221,7 @@ def ground_areas(
     """
     import shapely
 
-    shapes = [_cells(each, each.barred(height)) for each in maps]
-    barred = shapely.union_all(shapes)
+    barred = _barred(maps, height)
     if barred.is_empty:
         return ()
     by = max(max(_steps(each)) for each in maps) / 2
@@ -250,31 +239,30 @@ def ground_areas(
 
 def in_ground(maps: Sequence[GainMap], height: float, places: Real) -> Flags:
     """Return which of `places` (n, 2), m, are in the ground of `maps` at a `height`, m."""
-    found = np.zeros(len(places), dtype=np.bool_)
-    for each in maps:
-        k, m = (
-            np.rint((x - side[0]) / step).astype(int)
-            for x, side, step in zip(places.T, (each.east, each.north), _steps(each), strict=True)
-        )
-        on = (k >= 0) & (k < len(each.east)) & (m >= 0) & (m < len(each.north))
-        found[on] |= each.barred(height)[m[on], k[on]]
-    return found
+    import shapely
+
+    return np.asarray(shapely.intersects_xy(_barred(maps, height), *places.T))
 
 
 def _steps(known: GainMap) -> tuple[float, float]:
     return float(known.east[1] - known.east[0]), float(known.north[1] - known.north[0])
 
 
-def _cells(known: GainMap, barred: Flags) -> "BaseGeometry":
-    """Return the cells about the points of a map that are `barred` (m, k)."""
+@lru_cache(maxsize=16)
+def _barred(maps: Sequence[GainMap], height: float) -> "BaseGeometry":
+    """Return the cells about the points of `maps` whose ground is above a `height`, m."""
     import shapely
 
-    dx, dy = _steps(known)
-    edges = np.diff(np.pad(barred, ((0, 0), (1, 1))).astype(int), axis=1)
-    (row, first), (_, last) = np.nonzero(edges > 0), np.nonzero(edges < 0)  # runs along each row
-    x, y = known.east[0] - dx / 2, known.north[0] - dy / 2
-    boxes = shapely.box(x + dx * first, y + dy * row, x + dx * last, y + dy * (row + 1))
-    return shapely.union_all(boxes)
+    boxes = []
+    for known in maps:
+        dx, dy = _steps(known)
+        edges = np.diff(np.pad(known.barred(height), ((0, 0), (1, 1))).astype(int), axis=1)
+        (row, first), (_, last) = np.nonzero(edges > 0), np.nonzero(edges < 0)  # runs of each row
+        x, y = known.east[0] - dx / 2, known.north[0] - dy / 2
+        boxes += [*shapely.box(x + dx * first, y + dy * row, x + dx * last, y + dy * (row + 1))]
+    found = shapely.union_all(boxes)
+    shapely.prepare(found)
+    return found
 
 
 def _simplified(barred: "BaseGeometry", by: float, kept: Sequence[Vector]) -> "BaseGeometry":

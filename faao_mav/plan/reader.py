@@ -1,8 +1,8 @@
 """`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import InitVar, dataclass, fields
-from functools import cache, lru_cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from faao_mav.files import read_columns, read_text
 from faao_mav.plan.checks import problems
 from faao_mav.plan.fence import geofence, written_out
 from faao_mav.plan.keys import reference, unknown
-from faao_mav.plan.model import PlanContents, PlanFile
+from faao_mav.plan.model import PlanContents
 from faao_mav.plan.sections import CHOICES
 from faao_mav.plan.station import read_track
 from faao_mav.plan.yaml_text import MAX_CHARACTERS, dump_yaml, load_yaml
@@ -34,11 +34,7 @@ RATES = (("snr_db", "mbit_per_s"), ("snr_db", "bit_per_s_per_hz"))
 """The columns of a table of rates."""
 
 
-_READ = object()
-"""What tells a plan that has been read and checked from one that was put together otherwise."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Plan(PlanContents):
     """A validated plan, in SI units: `text` is its YAML, `source` the name of its file.
 
@@ -51,16 +47,14 @@ class Plan(PlanContents):
     (60.0, True, 100.0)
     """
 
-    text: str
-    source: str
-    made_by: InitVar[object] = None
+    text: str = field(init=False)
+    source: str = field(init=False)
 
-    def __post_init__(self, made_by: object) -> None:
-        if made_by is not _READ:
-            raise InputError(
-                "a plan is not put together or replaced field by field: use "
-                'plan.changed({"flight.altitude": 60}) or Plan.from_dict({...}), which check it'
-            )
+    def __init__(self, **_: object) -> None:
+        raise InputError(
+            "a plan is not put together or replaced field by field: use "
+            'plan.changed({"flight.altitude": 60}) or Plan.from_dict({...}), which check it'
+        )
 
     def __repr__(self) -> str:
         """Say what is to be flown, in a line."""
@@ -105,6 +99,9 @@ class Plan(PlanContents):
         return Plan.from_dict(data, self.source)
 
 
+_READER: TypeAdapter[Plan] = TypeAdapter(Plan)
+
+
 def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
     """Read and validate the plan in the file `path`.
 
@@ -136,15 +133,15 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     if files := filled_in(data, source):
         text = dump_yaml(data)
     try:
-        contents = _adapter().validate_python(data, context={})
+        plan = _READER.validate_python(data, context={})
     except ValidationError as error:
         raise PlanError(_describe(error, source, files)) from None
-    held = {field.name: getattr(contents, field.name) for field in fields(contents)}
-    fence = geofence(contents, source)
-    if contents.fence is not None and contents.fence.file is not None:
-        data["fence"] = written_out(fence, contents.fence.margin)
+    fence = geofence(plan, source)
+    if plan.fence is not None and plan.fence.file is not None:
+        data["fence"] = written_out(fence, plan.fence.margin)
         text = dump_yaml(data)
-    plan = Plan(**held, text=text, source=source, geofence=fence, made_by=_READ)
+    for name, value in {"geofence": fence, "text": text, "source": source}.items():
+        object.__setattr__(plan, name, value)
     for problem in problems(plan):
         raise PlanError(f"{source}: {problem}")
     return plan
@@ -244,11 +241,6 @@ def changed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, An
         below = inside if isinstance(inside, dict) else {}
         result[head] = changed(below, {rest: value}) if rest else value
     return result
-
-
-@cache
-def _adapter() -> TypeAdapter[PlanFile]:
-    return TypeAdapter(PlanFile)
 
 
 def _describe(error: ValidationError, source: str, files: Mapping[tuple[str, ...], str]) -> str:

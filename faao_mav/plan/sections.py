@@ -2,19 +2,14 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import field
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    Discriminator,
-    Field,
-    Tag,
-    ValidationInfo,
-)
+from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationInfo
 
 from faao_mav.geodesy import LocalFrame
 from faao_mav.plan.fields import (
-    MAX_LOCAL_DISTANCE,
+    DEFAULTS,
     Flag,
     Number,
     Position,
@@ -22,7 +17,6 @@ from faao_mav.plan.fields import (
     Velocity,
     Whole,
     check_degrees,
-    key,
     section,
     told,
 )
@@ -32,16 +26,16 @@ StudyScheme: TypeAlias = Literal[
     "faao", "algorithm1", "mmse", "mrt", "zf", "waterfilling", "gaussian"
 ]
 
-_HOVER = (0.0, 0.0)
+_HOVER: Any = "hover"
 
 
 @section
 class Origin:
     """The point of local [0, 0], WGS84."""
 
-    latitude: Number = key("Latitude.", "degrees", "degrees, -90 to 90, south negative")
-    longitude: Number = key("Longitude.", "degrees", "degrees, -180 to 180, west negative")
-    elevation: Number = key("Height above mean sea level.", "[-500, 9000] m", default=0.0)
+    latitude: Number
+    longitude: Number
+    elevation: Number = 0.0
 
     @property
     def frame(self) -> LocalFrame:
@@ -70,17 +64,19 @@ class Wind:
     (5.0, 0.0)
     """
 
-    speed: Number = key("Mean speed of the wind.", "[0, 50] m/s")
-    from_degrees: Number = key(
-        "Where it comes from, clockwise from north: 270 is west.", "[0, 360] degrees", name="from"
-    )
-    gust: Number = key("Speed in gusts; below `speed`: no gusts.", "[0, 100] m/s", default=0.0)
+    speed: Number
+    from_degrees: Number
+    gust: Number = 0.0
 
     @property
     def velocity(self) -> Vector:
         """The velocity of the air over the ground, [east, north] m/s."""
         angle = math.radians(self.from_degrees)
         return 0.0 - self.speed * math.sin(angle), 0.0 - self.speed * math.cos(angle)
+
+    def __str__(self) -> str:
+        gusts = f", gusts of {self.gust:g} m/s" if self.gust > self.speed else ""
+        return f"{self.speed:g} m/s from {self.from_degrees:g} degrees{gusts}"
 
 
 @section
@@ -114,28 +110,18 @@ class Flight:
     A velocity of None is free.
     """
 
-    start: Position = key("Where the flight starts, w_I.", "m")
-    end: Position = key("Where the flight ends, w_F.", "m")
+    start: Position
+    end: Position
     height: Annotated[
         Annotated[_Height, Tag("<height>")] | Annotated[Heights, Tag("<heights>")],
         Discriminator(lambda value: "<heights>" if isinstance(value, dict) else "<height>"),
         AfterValidator(_rising),
-    ] = key(
-        "Height H above the origin, or those of which the best is to be found.",
-        "m",
-        "a height above the origin in metres, 1 (an aircraft that is lower has hardly left the "
-        "ground) to 20000, or {least: metres, most: metres}",
-        name="altitude",
-    )
-    duration: Number = key(
-        "Duration T, in whole time steps; w_F is reached one step before its end.", "(0, 1e7] s"
-    )
-    time_step: Number = key("Length delta_t of a time slot.", "(0, 1e6] s", default=0.2)
-    start_velocity: Velocity = key("Velocity at the start; the paper: free.", "m/s", default=_HOVER)
-    end_velocity: Velocity = key("Velocity at the end; the paper: free.", "m/s", default=_HOVER)
-    bound_first_acceleration: Flag = key(
-        "Whether a_max bounds a(0) too, which the paper leaves unbounded.", default=True
-    )
+    ]
+    duration: Number
+    time_step: Number = 0.2
+    start_velocity: Velocity = _HOVER
+    end_velocity: Velocity = _HOVER
+    bound_first_acceleration: Flag = True
 
     @property
     def altitude(self) -> float:
@@ -152,57 +138,27 @@ class Flight:
 class Optimizer:
     """How the plan is optimised."""
 
-    method: Literal["direct", "algorithm1"] = key(
-        "The direct method, or the paper's Algorithm 1.", default="direct"
-    )
-    precoder: Literal["faao", "mmse", "mrt", "zf", "waterfilling"] = key(
-        "The precoders that the route is for.", default="faao"
-    )
-    inputs: Literal["alphabet", "gaussian"] = key(
-        "Inputs that the design is for; what is told is the alphabet's rate.", default="alphabet"
-    )
-    rate: Literal["cutoff", "mutual_information"] = key(
-        "The rate that counts: what any code carries, or what the best approach.", default="cutoff"
-    )
-    starts: tuple[Literal["straight", "global", "bs", "user", "bs-user", "user-bs"], ...] = key(
-        "Routes that the direct method starts from.",
-        min_length=1,
-        default=("straight", "bs", "user", "bs-user", "user-bs"),
-    )
-    tolerance: Number = key(
-        "Algorithm 1: change of R_avg at which it ends; direct: largest residual.",
-        "(0, 10] bit/s/Hz",
-        default=1e-4,
-    )
-    max_iterations: Whole = key(
-        "Iterations of Algorithm 1; Newton steps per start of the direct method, which takes "
-        "six times as many at most for a queue with a buffer, half duplex or a least speed.",
-        "[1, 10000]",
-        default=50,
-    )
+    method: Literal["direct", "algorithm1"] = "direct"
+    precoder: Literal["faao", "mmse", "mrt", "zf", "waterfilling"] = "faao"
+    inputs: Literal["alphabet", "gaussian"] = "alphabet"
+    rate: Literal["cutoff", "mutual_information"] = "cutoff"
+    starts: Annotated[
+        tuple[Literal["straight", "global", "bs", "user", "bs-user", "user-bs"], ...],
+        Field(min_length=1),
+    ] = ("straight", "bs", "user", "bs-user", "user-bs")
+    tolerance: Number = 1e-4
+    max_iterations: Whole = 50
 
 
 @section
 class Goal:
     """What the plan is for; by default the highest rate. Duration and powers are upper limits."""
 
-    maximise: Literal["rate", "data"] | None = key(
-        "What is maximised: the rate, or the data within energy_wh.", default=None
-    )
-    energy_wh: Number | None = key(
-        "Energy of the flight and its relay (needs vehicle.power).", "(0, 1e6] Wh", default=None
-    )
-    minimise: Literal["duration", "power", "energy"] | None = key(
-        "What is minimised: the duration in whole time steps, both powers by the same dB, or "
-        "the energy of the planned flight and its relay (needs vehicle.power).",
-        default=None,
-    )
-    deliver_mbytes: Number | None = key(
-        "What has to be delivered (needs radio.bandwidth_mhz).", "(0, 1e9] megabytes", default=None
-    )
-    rate: Number | None = key(
-        "Instead: the delivered rate R_del that is needed.", "(0, 10000] bit/s/Hz", default=None
-    )
+    maximise: Literal["rate", "data"] | None = None
+    energy_wh: Number | None = None
+    minimise: Literal["duration", "power", "energy"] | None = None
+    deliver_mbytes: Number | None = None
+    rate: Number | None = None
 
     @property
     def searches(self) -> str:
@@ -216,15 +172,15 @@ class Goal:
 class CircleZone:
     """A circle of the fence."""
 
-    center: Position = key("Centre of the circle.", "m")
-    radius: Number = key("Radius of the circle.", "m", gt=0, le=MAX_LOCAL_DISTANCE)
+    center: Position
+    radius: Number
 
 
 @section
 class PolygonZone:
     """A polygon of the fence."""
 
-    polygon: tuple[Position, ...] = key("Corners.", "m", "three corners or more", min_length=3)
+    polygon: Annotated[tuple[Position, ...], Field(min_length=3)]
 
 
 CHOICES = ("<height>", "<heights>", "<circle>", "<polygon>", "<corners>", "<zones>")
@@ -236,10 +192,10 @@ def _zone(value: object) -> str:
 
 
 def _corners_or_zones(value: object) -> str:
-    zones = isinstance(value, list | tuple) and any(
+    zones = isinstance(value, list) and any(
         isinstance(each, dict) and not {"latitude", "longitude"} & set(each) for each in value
     )
-    return "<zones>" if zones else "<corners>"
+    return "<zones>" if zones or value == () else "<corners>"
 
 
 def _one_polygon(corners: tuple[Vector, ...]) -> tuple[PolygonZone, ...]:
@@ -263,51 +219,30 @@ class FenceOptions:
     inclusion: Annotated[
         Annotated[_OnePolygon, Tag("<corners>")] | Annotated[Zones, Tag("<zones>")],
         Discriminator(_corners_or_zones),
-    ] = key(
-        "Area to stay in; of several zones PX4 asks for any, ArduPilot for all.",
-        "m",
-        "three corners or more, or a list of {center, radius} and {polygon}",
-        default=(),
-    )
-    exclusion: Zones = key(
-        "Zones to stay out of.", accepted="a list of {center, radius} and {polygon}", default=()
-    )
-    file: Text | None = key(
-        "File with more zones, beside the plan's file or by its whole path.",
-        accepted="the name of a .plan, .kml or .geojson file",
-        default=None,
-    )
-    margin: Number = key("Distance that the plan keeps from the edge.", "[0, 10000] m", default=5.0)
+    ] = ()
+    exclusion: Zones = ()
+    file: Text | None = None
+    margin: Number = 5.0
 
 
 @section
 class MissionOptions:
     """How the trajectory becomes a mission."""
 
-    takeoff: Flag = key("Whether the mission begins with a take-off.", default=True)
-    on_finish: Literal["rtl", "land", "hover"] = key("What is done at the end.", default="rtl")
-    path_tolerance: Number = key(
-        "Largest distance of the predicted flight from the path.", "[0.1, 1000] m", default=2.0
-    )
-    max_items: Whole = key("Most mission items, the home row included.", "[2, 65535]", default=600)
-    parameters: Literal["recommend", "keep"] = key(
-        "recommend: time the mission for limits that suit it, and write them beside it; "
-        "keep: fit it to the vehicle's.",
-        default="recommend",
-    )
+    takeoff: Flag = True
+    on_finish: Literal["rtl", "land", "hover"] = "rtl"
+    path_tolerance: Number = 2.0
+    max_items: Whole = 600
+    parameters: Literal["recommend", "keep"] = "recommend"
 
 
 @section
 class Study:
     """What `faao-mission study` varies; the main job takes no notice of it."""
 
-    vary: Mapping[str, Annotated[tuple[Any, ...], Field(min_length=1)]] = key(
-        "Values by dotted key; power_dbm stands for both powers.",
-        accepted="lists of values by dotted key",
-        default_factory=dict,
+    vary: Mapping[str, Annotated[tuple[Any, ...], Field(min_length=1)]] = field(
+        default_factory=DEFAULTS
     )
-    schemes: tuple[StudyScheme, ...] = key("Designs to compare.", min_length=1, default=("faao",))
-    seeds: Whole = key("Draws of the fading, from radio.seed on.", "[1, 10000]", default=1)
-    figure: Literal["delivered", "rate", "trajectories"] = key(
-        "What the figure shows: the delivered rate, R_avg, or the routes.", default="delivered"
-    )
+    schemes: Annotated[tuple[StudyScheme, ...], Field(min_length=1)] = ("faao",)
+    seeds: Whole = 1
+    figure: Literal["delivered", "rate", "trajectories"] = "delivered"

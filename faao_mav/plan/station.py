@@ -2,7 +2,7 @@
 
 import math
 from datetime import UTC, datetime
-from typing import Annotated, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from pydantic import PlainValidator, ValidationInfo
@@ -11,7 +11,7 @@ from pydantic_core import PydanticCustomError
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, MissionFileError, PlanError, quote
 from faao_mav.files import read_columns
-from faao_mav.plan.fields import PLACE, Written, key, read_pair, read_position, section, told
+from faao_mav.plan.fields import PLACE, read_pair, read_position, section, told
 from faao_mav.vector import Vector
 
 MAX_POINTS = 5_000
@@ -109,7 +109,8 @@ def _place(value: object, info: ValidationInfo) -> Vector:
     return place
 
 
-_Place: TypeAlias = Annotated[Vector, PlainValidator(_place), Written(PLACE)]
+_OF_TRACK: Any = None
+_Place: TypeAlias = Annotated[Vector, PlainValidator(_place), PLACE]
 
 
 def _velocity(value: object) -> Vector:
@@ -120,7 +121,7 @@ def _velocity(value: object) -> Vector:
 
 
 _Velocity: TypeAlias = Annotated[
-    Vector, PlainValidator(_velocity), Written(f"[east, north] in m/s, at most {_FASTEST:g} m/s")
+    Vector, PlainValidator(_velocity), f"[east, north] in m/s, at most {_FASTEST:g} m/s"
 ]
 
 
@@ -133,19 +134,9 @@ class Station:
     [[0.0, 50.0], [50.0, 50.0]]
     """
 
-    track: Annotated[Track | None, PlainValidator(_track)] = key(
-        "Way with times, the first of which is the plan's start; null: none.",
-        accepted="the name of a .csv with time_s and east_m, north_m or latitude, longitude, or of "
-        "a .gpx with times",
-        default=None,
-    )
-    position: _Place = key(
-        "Place at the plan's start, which has to be given without track.",
-        "m",
-        default=None,
-        validate_default=True,
-    )
-    velocity: _Velocity = key("Velocity over ground.", "m/s", default=(0.0, 0.0))
+    track: Annotated[Track | None, PlainValidator(_track)] = None
+    position: _Place = _OF_TRACK
+    velocity: _Velocity = (0.0, 0.0)
 
     @property
     def moves(self) -> bool:

@@ -1,7 +1,7 @@
 """What the plan says of the aircraft, its power and its battery: `vehicle`."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, field, fields
 from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, PlainValidator, TypeAdapter, ValidationInfo
@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, PlainValidator, TypeAdapter, ValidationInf
 from faao_mav.autopilot import autopilots, kinds, vehicle_type
 from faao_mav.autopilot.body import Body, CopterBody, PlaneBody
 from faao_mav.errors import InputError
-from faao_mav.plan.fields import Number, Written, key, listed, one_of, section, told
+from faao_mav.plan.fields import DEFAULTS, Number, listed, one_of, section, told
 from faao_mav.power import GRAVITY, FixedWing, PowerModel, RotaryWing
 
 _COPTER_MASS, _PLANE_MASS = 20 / GRAVITY, 10.0
@@ -29,23 +29,17 @@ class PowerOptions:
     The defaults are those of the aircraft of the papers.
     """
 
-    hover_w: Number | None = key(
-        "Copter: power in hover; with cruise_w and at.", "(0, 1e6] W", default=None
-    )
-    cruise_w: Number | None = key(
-        "Power at airspeed `at`; of a plane at that of longest range.", "(0, 1e6] W", default=None
-    )
-    at: Number | None = key("Airspeed of cruise_w.", "(0, 1000] m/s", default=None)
-    mass: Number | None = key(
-        "Mass; null: 2.039 kg for copters, 10 kg for planes.", "(0, 100000] kg", default=None
-    )
-    rotor_area: Number = key("Copter: area of all rotor discs.", "(0, 10000] m^2", default=0.503)
-    solidity: Number = key("Copter: area of blades by that of discs.", "(0, 1]", default=0.05)
-    tip_speed: Number = key("Copter: speed of blade tips.", "(0, 400] m/s", default=120.0)
-    drag_ratio: Number = key("Copter: fuselage drag ratio d_0.", "[0, 1000]", default=0.6)
-    air_density: Number = key("Copter: density of the air.", "(0, 2] kg/m^3", default=1.225)
-    c1: Number = key("Plane: factor of v^3.", "(0, 1e6] W s^3/m^3", default=9.26e-4)
-    c2: Number = key("Plane: factor of 1 / v.", "(0, 1e9] W m/s", default=2250.0)
+    hover_w: Number | None = None
+    cruise_w: Number | None = None
+    at: Number | None = None
+    mass: Number | None = None
+    rotor_area: Number = 0.503
+    solidity: Number = 0.05
+    tip_speed: Number = 120.0
+    drag_ratio: Number = 0.6
+    air_density: Number = 1.225
+    c1: Number = 9.26e-4
+    c2: Number = 2250.0
 
     def model(self, *, hovers: bool) -> PowerModel:
         """Return the power of an aircraft that `hovers`, or of a plane."""
@@ -66,10 +60,8 @@ class PowerOptions:
 class Battery:
     """The battery that the whole mission is held against (needs `vehicle.power`)."""
 
-    capacity_wh: Number = key("Energy of the full battery.", "(0, 1e6] Wh")
-    reserve: Annotated[Number, BeforeValidator(_percent)] = key(
-        "Share to be left after landing.", "[0, 99] %", "a percentage, 0 to 99", default=20.0
-    )
+    capacity_wh: Number
+    reserve: Annotated[Number, BeforeValidator(_percent)] = 20.0
 
     @property
     def usable(self) -> float:
@@ -77,8 +69,8 @@ class Battery:
         return self.capacity_wh * (1 - self.reserve / 100)
 
 
-AutopilotName: TypeAlias = Annotated[str, one_of(autopilots), Written(lambda: listed(autopilots()))]
-KindName: TypeAlias = Annotated[str, one_of(kinds), Written(lambda: listed(kinds()))]
+AutopilotName: TypeAlias = Annotated[str, one_of(autopilots), autopilots]
+KindName: TypeAlias = Annotated[str, one_of(kinds), kinds]
 
 
 def _body_of(value: object, info: ValidationInfo) -> Body | None:
@@ -108,33 +100,13 @@ _NUMBERS = {each.name for body in (CopterBody, PlaneBody) for each in fields(bod
 class VehicleOptions:
     """The aircraft and its limits."""
 
-    autopilot: AutopilotName = key("The autopilot that the mission is for.", default="ardupilot")
-    type: KindName = key("The kind of aircraft; a plane with ArduPilot.", default="copter")
-    max_speed: Number = key(
-        "Largest speed v_max, over the ground; of a plane, through the air.", "(0, 1000] m/s"
-    )
-    max_acceleration: Number = key("Largest acceleration a_max.", "(0, 1000] m/s^2")
-    min_speed: Number = key(
-        "Least speed v_min through the air: above 0 both ends are free or velocities.",
-        "[0, 1000] m/s",
-        "a speed from 0 m/s, below max_speed",
-        default=0.0,
-    )
-    max_airspeed: Number | None = key(
-        "Largest airspeed of a plan with a wind; null: what the vehicle holds, for a plane "
-        "max_speed.",
-        "(0, 1000] m/s",
-        default=None,
-    )
-    parameters: Mapping[str, Number] = key(
-        "Parameters of the autopilot, in its own units, that the flight is predicted with.",
-        accepted="autopilot parameters as NAME: number",
-        default_factory=dict,
-    )
-    body: Annotated[Body | None, PlainValidator(_body_of)] = key(
-        "The airframe that flights are predicted with: numbers over those of the simulator's.",
-        accepted="sitl, the airframe of the autopilot's simulator, or a mapping of its numbers",
-        default=None,
-    )
+    autopilot: AutopilotName = "ardupilot"
+    type: KindName = "copter"
+    max_speed: Number
+    max_acceleration: Number
+    min_speed: Number = 0.0
+    max_airspeed: Number | None = None
+    parameters: Mapping[str, Number] = field(default_factory=DEFAULTS)
+    body: Annotated[Body | None, PlainValidator(_body_of)] = None
     power: PowerOptions | None = None
     battery: Battery | None = None
