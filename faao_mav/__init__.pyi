@@ -1,0 +1,67 @@
+"""Which module has each public name, for type checkers and for `__getattr__` of `__init__.py`."""
+
+from faao_mav.autopilot import Track as Track
+from faao_mav.autopilot import Vehicle as Vehicle
+from faao_mav.autopilot.predict import predict as predict
+from faao_mav.errors import FaaoError as FaaoError
+from faao_mav.errors import InfeasibleError as InfeasibleError
+from faao_mav.errors import InputError as InputError
+from faao_mav.errors import LinkError as LinkError
+from faao_mav.errors import MissionFileError as MissionFileError
+from faao_mav.errors import ParameterFileError as ParameterFileError
+from faao_mav.errors import PlanError as PlanError
+from faao_mav.errors import SolverError as SolverError
+from faao_mav.fly.fly import fly_mission as fly_mission
+from faao_mav.fly.logs import read_log as read_log
+from faao_mav.fly.preflight import Flight as Flight
+from faao_mav.mission import Mission as Mission
+from faao_mav.mission import MissionItem as MissionItem
+from faao_mav.mission.formats import read_mission as read_mission
+from faao_mav.mission.formats import render_mission as render_mission
+from faao_mav.mission.formats.parameter_file import read_parameters as read_parameters
+from faao_mav.mission.formats.parameter_file import render_parameters as render_parameters
+from faao_mav.optimizer.optimize import optimize as optimize
+from faao_mav.optimizer.pricing import price as price
+from faao_mav.optimizer.pricing import saturation as saturation
+from faao_mav.optimizer.problem import OwnParts as OwnParts
+from faao_mav.optimizer.problem import Problem as Problem
+from faao_mav.optimizer.problem import build_problem as build_problem
+from faao_mav.optimizer.search.bound import upper_bound as upper_bound
+from faao_mav.optimizer.solution import Solution as Solution
+from faao_mav.optimizer.solution import load_solution as load_solution
+from faao_mav.optimizer.solution import save_solution as save_solution
+from faao_mav.plan import Plan as Plan
+from faao_mav.plan import parse_plan as parse_plan
+from faao_mav.plan import read_plan as read_plan
+from faao_mav.radio.fit import LinkFit as LinkFit
+from faao_mav.radio.fit import Samples as Samples
+from faao_mav.radio.fit import fit_link as fit_link
+from faao_mav.radio.gain import GainFunction as GainFunction
+from faao_mav.radio.gain import PathGain as PathGain
+from faao_mav.radio.measured import read_measured as read_measured
+from faao_mav.radio.rate_steps import StreamRate as StreamRate
+from faao_mav.report.debrief import debrief as debrief
+from faao_mav.report.figures import flight_figure as flight_figure
+from faao_mav.report.figures import route_figure as route_figure
+from faao_mav.report.page import render_report as render_report
+from faao_mav.report.style import save_figure as save_figure
+from faao_mav.schedule import Conversion as Conversion
+from faao_mav.schedule import convert as convert
+from faao_mav.study import StudyRow as StudyRow
+from faao_mav.study import as_array as as_array
+from faao_mav.study import make_cases as make_cases
+from faao_mav.study import parse_vary as parse_vary
+from faao_mav.study import run_study as run_study
+from faao_mav.study import study_figure as study_figure
+from faao_mav.validate import Check as Check
+from faao_mav.validate import Finding as Finding
+from faao_mav.validate import Limits as Limits
+from faao_mav.validate import LinkCheck as LinkCheck
+from faao_mav.validate import check as check
+from faao_mav.wire import download as download
+from faao_mav.wire import upload as upload
+from faao_mav.workflow import Result as Result
+from faao_mav.workflow import plan_mission as plan_mission
+
+__all__: list[str]
+__version__: str
