@@ -185,10 +185,8 @@ class FixedWing:
         """Return what flight at v and a (2, ...), m/s, m/s^2, takes at most, with derivatives."""
         speed = np.maximum(np.hypot(*v), _LEAST_AIRSPEED)
         across = v[0] * a[1] - v[1] * a[0]
-        by_turn, turned = (
-            np.stack([a[1], -a[0]]),
-            np.stack([-v[1], v[0]]),
-        )  # the gradients of across
+        by_turn = np.stack([a[1], -a[0]])  # the gradients of across
+        turned = np.stack([-v[1], v[0]])
         bank = self.c2 / GRAVITY**2 / speed**3
         gained = (v * a).sum(axis=0)
         root = np.hypot(gained, _KINK)

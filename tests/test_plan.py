@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from faao_mav.autopilot.body import ARDUCOPTER_BODY, PX4_BODY
 from faao_mav.errors import InputError, PlanError
+from faao_mav.files import table
 from faao_mav.plan import Plan, checks, parse_plan, read_plan, reference
 from faao_mav.plan.reader import changed
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
@@ -188,6 +189,8 @@ def test_defaults_of_the_relay_and_how_long_a_flight_takes() -> None:
 def test_every_key_is_documented_and_its_default_is_what_a_plan_gets() -> None:
     keys = reference()
     assert all(key.description and key.accepted for key in keys.values())
+    said = {key.description for key in keys.values()}
+    assert [row for row in table("plan/keys.tsv") if row["means"] not in said] == []
     assert [path for path, key in keys.items() if key.required and not key.inside] == [
         "site.origin.latitude", "site.origin.longitude", "site.wind.speed", "site.wind.from",
         "vehicle.max_speed", "vehicle.max_acceleration", "vehicle.battery.capacity_wh",

@@ -128,17 +128,16 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
         section = data.setdefault("optimizer", {})
         if isinstance(section, dict):
             section["method"] = method
-        text = dump_yaml(data)
-    # a copy of the text, as beside a result, has to stand without the files that it names
-    if files := filled_in(data, source):
-        text = dump_yaml(data)
+    files = filled_in(data, source)
     try:
         plan = _READER.validate_python(data, context={})
     except ValidationError as error:
         raise PlanError(_describe(error, source, files)) from None
     fence = geofence(plan, source)
-    if plan.fence is not None and plan.fence.file is not None:
+    if of_file := plan.fence is not None and plan.fence.file is not None:
         data["fence"] = written_out(fence, plan.fence.margin)
+    # a copy of the text, as beside a result, has to stand without the files that it names
+    if method is not None or files or of_file:
         text = dump_yaml(data)
     for name, value in {"geofence": fence, "text": text, "source": source}.items():
         object.__setattr__(plan, name, value)
@@ -178,7 +177,10 @@ def filled_in(data: dict[str, Any], source: str) -> dict[tuple[str, ...], str]:
     """
     files: dict[tuple[str, ...], str] = {}
     for keys, read in _FILES:
-        section, key, law = _holder(data, keys), keys[-1], files.get(keys[:-1])
+        section, key, law = data, keys[-1], files.get(keys[:-1])
+        for step in keys[:-1]:
+            inside = section.get(step)
+            section = inside if isinstance(inside, dict) else {}
         name = section.get(key)
         if not isinstance(name, str) or "\n" in name or name.startswith(WORD):
             continue  # it is the content itself
@@ -201,13 +203,6 @@ def _word(path: Path, changed: int) -> str:
     """Return the word of a map's file: the page reads its plan anew at every change of it."""
     del changed
     return map_word(read_map(path))
-
-
-def _holder(data: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
-    for step in keys[:-1]:
-        inside = data.get(step)
-        data = inside if isinstance(inside, dict) else {}
-    return data
 
 
 def _plain(value: Any, source: str) -> Any:
