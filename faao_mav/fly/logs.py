@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 Said: TypeAlias = tuple[int, int, str, Mapping[str, Any]]
 """System and component of MAVLink that said it, 0 in a vehicle's own log; name; values by field."""
 
-_TOLD = {
+_TOLD: dict[str, tuple[str, dict[str, float]]] = {
     "POS": ("place", {"TimeUS": 1e6, "Lat": 1, "Lng": 1, "Alt": 1, "RelHomeAlt": 1}),
     "GLOBAL_POSITION_INT": (
         "place", {"time_boot_ms": 1e3, "lat": 1e7, "lon": 1e7, "alt": 1e3, "relative_alt": 1e3},

@@ -1,6 +1,6 @@
 """`plan.yaml` -> `Plan`, or lines that name key, value and what is accepted."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
