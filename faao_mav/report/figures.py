@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.shadowing import Shadowed, arriving
+from faao_mav.optimizer.shadowing import arriving
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.report.maps import mission_map, route_map
@@ -135,28 +135,27 @@ def plan_figures(result: Result, log: "FromLog | None" = None) -> Iterator[Shown
     held, unit = of_a_slot(plan)
     waiting = {name: (t, held * flight.relayed.queue) for name, flight in flights.items()}
     buffer = {"buffer": most} if (most := plan.radio.relay.buffer_mbytes) else {}
-    half = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
-    title = f"What the relay has received and not yet forwarded, over time{half}"
+    shared = ", both hops sharing each slot" if plan.radio.duplex == "half" else ""
+    title = f"What the relay has received and not yet forwarded, over time{shared}"
     yield Shown("Queue", _figure(_Plot(f"waiting, {unit}", waiting, buffer)), title)
     if (under := result.shadowed) is not None:
+        rates = np.stack([solution.I_U, solution.I_G])
+        arrived = held * arriving(solution.problem, rates, solution.shares)
+        low, half, high = (held * under.arrived[part] for part in (0.1, 0.5, 0.9))
+        after = t + plan.flight.time_step
+        arrival = _Plot(
+            f"arrived, {unit}",
+            {"planned": (after, arrived), "median": (after, half)},
+            band=("8 of 10", after, low, high),
+        )
         title = f"What has arrived over time, as {rate} counts it: planned without shadowing; "
         title += "with it the median, and in the band eight of ten, one above, one below"
-        yield Shown("What arrives", _figure(_arrival(solution, under)), title)
+        yield Shown("What arrives", _figure(arrival), title)
     begun, ended = solution.history[0], solution.history[-1]
     title = f"{rate} after each iteration, from {begun:.4f} to {ended:.4f} bit/s/Hz"
     yield Shown("Convergence", _convergence(solution), title)
     title = "Power on each stream over time, base station and UAV, strongest stream first"
     yield Shown("Precoders", _precoder_power(solution), title)
-
-
-def _arrival(solution: Solution, under: Shadowed) -> _Plot:
-    """Return what has arrived over time: planned, and under shadowing with a band of 0.1 to 0.9."""
-    held, unit = of_a_slot(solution.plan)
-    t = solution.t + solution.plan.flight.time_step
-    planned = arriving(solution.problem, np.stack([solution.I_U, solution.I_G]), solution.shares)
-    low, half, high = (held * under.arrived[part] for part in (0.1, 0.5, 0.9))
-    curves = {"planned": (t, held * planned), "median": (t, half)}
-    return _Plot(f"arrived, {unit}", curves, band=("8 of 10", t, low, high))
 
 
 def _precoder_power(solution: Solution) -> "Figure":

@@ -1,6 +1,5 @@
 """Maps: of a plan's route with its speeds, and of a mission alone, each with what is about it."""
 
-import itertools
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 WAYPOINTS = (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT)
 """The commands of a relay route, whose items are numbered on its map."""
 
-_PIECES = 240  # pieces of the route with a colour each, at most: more cannot be told apart
+_MOST_DRAWN = 400  # points of a line on a map and of a chart: more cannot be told apart. Chosen
 _LEVELS = 32  # colours on the scale of speeds; chosen: the steps cannot be seen
 
 
@@ -38,6 +37,9 @@ def route_map(
     East and north are in metres. It shows all of the flight and both stations, and of a wider fence
     what is near them.
     """
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import LinearSegmentedColormap
+
     plan = solution.plan
     stations = [station.at(solution.t) for station in plan.radio.stations]
     frame = plan.origin.frame
@@ -47,7 +49,15 @@ def route_map(
         for edge in plan.keep_in.inside(plan.fence.margin).edges():
             name = f"margin {plan.fence.margin:g} m"
             plot.plot(*edge.T, ":", color=style.MUTED, linewidth=0.9, label=name)
-    _coloured(plot, solution)
+    w, speeds = thinned(solution.w), thinned(lengths(solution.v))
+    colours = LinearSegmentedColormap.from_list("speeds", style.SPEEDS, _LEVELS)
+    pieces = list(np.stack([w[:-1], w[1:]], axis=1))
+    means = (speeds[:-1] + speeds[1:]) / 2
+    lines = LineCollection(pieces, cmap=colours, linewidths=5, capstyle="round")
+    lines.set_array(means)
+    lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
+    plot.add_collection(lines)
+    style.colour_bar(plot, lines, "planned speed, m/s", 0.7)
     seen, numbers = [solution.w, *stations], []
     if flown is not None:
         seen.append(flown.w)
@@ -80,6 +90,12 @@ def mission_map(mission: Mission, track: Track) -> "Figure":
         _show_all(plot, np.concatenate([flown, *places]), outlines)
         style.write_beside(plot, numbers)
     return figure
+
+
+def thinned(values: Real) -> Real:
+    """Return at most `_MOST_DRAWN` of `values` (n, ...), the first and the last among them."""
+    kept = np.linspace(0, len(values) - 1, min(len(values), _MOST_DRAWN)).round().astype(int)
+    return np.asarray(values[kept])
 
 
 def placed_items(
@@ -122,25 +138,6 @@ def _show_all(plot: "Axes", seen: Real, outlines: Sequence[Real]) -> None:
     plot.margins(0.08)
     style.label(plot, "", "east, m", "north, m")
     style.legend_above(plot, 2)
-
-
-def _coloured(plot: "Axes", solution: Solution) -> None:
-    """Draw the planned route in the colours of its speeds."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import LinearSegmentedColormap
-
-    count = len(solution.w)
-    ends = np.linspace(0, count - 1, min(count, _PIECES + 1)).round().astype(int)
-    pieces = [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
-    speeds = lengths(solution.v)
-    means = np.array([speeds[piece].mean() for piece in pieces])
-    colours = LinearSegmentedColormap.from_list("speeds", style.SPEEDS, _LEVELS)
-    route = [solution.w[piece] for piece in pieces]
-    lines = LineCollection(route, cmap=colours, linewidths=5, capstyle="round")
-    lines.set_array(means)
-    lines.set_clim(0, max(round(float(means.max()), 2), 0.01))  # round: labelled at its end
-    plot.add_collection(lines)
-    style.colour_bar(plot, lines, "planned speed, m/s", 0.7)
 
 
 def _draw_items(

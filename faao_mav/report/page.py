@@ -6,6 +6,7 @@ from html import escape
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import TYPE_CHECKING
 
 from faao_mav.files import write_whole
@@ -22,9 +23,6 @@ from faao_mav.workflow import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'"
-"""The page's Content-Security-Policy: its own style, and nothing from elsewhere."""
 
 
 def render_report(about: Result | Check | FromLog, *, title: str = "") -> str:
@@ -59,31 +57,19 @@ def write_part(result: Result, part: str, path: Path) -> None:
 
 
 def page(title: str, content: str) -> str:
-    """Return a whole page of sections, offline, for light, dark, phone and paper."""
-    title = escape(title)
+    """Return a whole page of sections, offline, for light, dark, phone and paper.
+
+    Its Content-Security-Policy allows its own style, and nothing from elsewhere.
+    """
     packages = ("faao-mav", "numpy", "scipy", "matplotlib")
     made_by = [f"{name} {version(name)}" for name in packages]
     made_by.append(f"Python {platform.python_version()}")
-    style = files("faao_mav.report").joinpath("page.css").read_text(encoding="utf-8")
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{_POLICY}">
-<title>{title}</title>
-<style>
-{style}</style>
-</head>
-<body>
-<h1>{title}</h1>
-<main>
-{content}
-</main>
-<footer>{escape(", ".join(made_by))}</footer>
-</body>
-</html>
-"""
+    html, style = (
+        files("faao_mav.report").joinpath(name).read_text(encoding="utf-8")
+        for name in ("page.html", "page.css")
+    )
+    told = {"title": escape(title), "made_by": escape(", ".join(made_by))}
+    return Template(html).substitute(told, style=style, content=content)
 
 
 def _sections(about: Result | Check | FromLog) -> Iterator[str]:

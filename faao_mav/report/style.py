@@ -15,15 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from faao_mav.arrays import Real
 from faao_mav.files import FIGURES, check_ending, write_whole
-from faao_mav.vector import lengths
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
-    from matplotlib.path import Path as MatplotlibPath
 
 INK, MUTED, GRID, PAPER = "#1c1e21", "#5f6670", "#d9dce0", "#fefefe"
 """Colours of text, of what is secondary, of grids and of the paper; a page replaces them."""
@@ -36,53 +33,31 @@ vanish on white and on black paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # of curves, in the order of `SERIES`
 WIDTH = 4.2  # inches: a page makes a figure as wide as a phone, where 9 points must still be read
 
-_SIDES = [np.array(side) for side in itertools.product((1, -1, 0), repeat=2) if any(side)]
+_AWAY, _CLEAR = 5.0, 2.5
+"""Points from a place to its text, and from a text to lines and other texts. Chosen."""
+_SIDES: list[dict[str, Any]] = [
+    {"position": (_AWAY * x, _AWAY * y), "ha": across, "va": up}
+    for (x, across), (y, up) in itertools.product(
+        ((1, "left"), (-1, "right"), (0, "center")), ((1, "bottom"), (-1, "top"), (0, "center"))
+    )
+    if x or y
+]
 """The sides of a place on which a text may stand, from the first that is tried on."""
-_AWAY, _CLEAR = (4.0, 16.0), 2.5
-"""Points from a place to its text, the second for one that is not left out, and from a text to
-lines and other texts. Chosen: beside the map's widest line, of 5 points, texts stay clear."""
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
 }
 """The custom property of the page for each colour of the figures."""
 
-_SETTINGS: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "faao-mav",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": MUTED,
-    "axes.facecolor": PAPER,
-    "axes.titlesize": 10.0,
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.6,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "legend.framealpha": 0.8,
-    "legend.facecolor": PAPER,
-    "legend.edgecolor": "none",
-    "figure.facecolor": PAPER,
-    "lines.linewidth": 1.6,
-}
-
 
 @contextmanager
 def styled() -> Iterator[None]:
     """Draw and save within this: matplotlib's settings are its global state."""
-    import matplotlib as mpl
+    from matplotlib import style
 
-    with mpl.rc_context(), warnings.catch_warnings():
+    sheet = Path(__file__).with_name("figures.mplstyle")
+    with style.context(sheet, after_reset=True), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # names in any script
-        mpl.rcdefaults()
-        mpl.rcParams.update(_SETTINGS)
         yield
 
 
@@ -128,20 +103,16 @@ def mark_stations(
 ) -> None:
     """Mark (name, places (k, 2), marker) on a plot that is finished, with their names beside them.
 
-    They are marked where they are first. Of one that moves the way is a line with an arrow, and a
-    hollow mark where it ends. Each `more` (text, [east, north]) is written too, where it covers
+    They are marked where they are first. Of one that moves the way is a line, and there is a hollow
+    mark where it ends. Each `more` (text, [east, north]) is written too, where it covers
     nothing.
     """
-    held: Any = {"scalex": False, "scaley": False, "color": INK}
+    held: Any = {"scalex": False, "scaley": False, "color": INK, "zorder": 5}
     for _, way, marker in places:
-        axes.plot(*way[0], marker, markersize=7, zorder=5, **held)
-        left = lengths(np.asarray(way) - way[-1])
-        if left.any():
-            axes.plot(*np.transpose(way), linewidth=1.0, zorder=4, **held)
-            axes.plot(*way[-1], marker, markersize=7, markerfacecolor=PAPER, zorder=5, **held)
-            middle = max(1, int(np.argmax(left <= left[0] / 2)))
-            arrow = {"arrowstyle": "-|>", "color": INK, "mutation_scale": 14}
-            axes.annotate("", way[middle], way[middle - 1], arrowprops=arrow, zorder=5)
+        axes.plot(*way[0], marker, markersize=7, **held)
+        if np.ptp(way, axis=0).any():
+            axes.plot(*np.transpose(way), linewidth=1.0, **held)
+            axes.plot(*way[-1], marker, markersize=7, markerfacecolor=PAPER, **held)
     write_beside(axes, [*((name, way[0]) for name, way, _ in places), *more], always=len(places))
 
 
@@ -151,48 +122,38 @@ def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0
     Where there is no such place a text is left out; of the first `always` none is: they stand where
     they cover least.
     """
-    figure = axes.get_figure(root=True)
-    assert figure is not None
-    figure.draw_without_rendering()  # from here on places on the paper are known
-    pixels, paper = figure.dpi / 72, axes.get_window_extent()
-    lines, marks = _drawn(axes)
-    taken: list[Any] = []
-    for k, (text, place) in enumerate(texts):
-        shown = axes.annotate(
-            text, place, (0, 0), textcoords="offset points", ha="center", va="center", zorder=6,
-            fontsize=9 if k < always else 8,
-            bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
-        )  # fmt: skip
-        box = shown.get_window_extent()
-        size, tried = np.array([box.width, box.height]) / 2, []
-        for away, side in itertools.product(_AWAY[: 2 if k < always else 1], _SIDES):
-            offset = side * (size + away * pixels)
-            there = box.translated(*offset)
-            clear = there.padded(_CLEAR * pixels)
-            outside = not (paper.contains(*there.min) and paper.contains(*there.max))
-            covers = sum(line.intersects_bbox(clear, filled=False) for line in lines)
-            covers += clear.count_contains(marks)
-            tried.append(((outside, clear.count_overlaps(taken), covers), offset, there))
-        covered, offset, there = min(tried, key=lambda each: each[0])
-        if any(covered) and k >= always:
-            shown.remove()
-        else:
-            shown.set_position(offset / pixels)
-            taken.append(there)
-
-
-def _drawn(axes: "Axes") -> tuple[list["MatplotlibPath"], Real]:
-    """Return the lines of a plot, and the places (n, 2) of its marks, pixels."""
     from matplotlib.collections import LineCollection
     from matplotlib.path import Path as MatplotlibPath
 
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()  # from here on places on the paper are known
     routes = [each for each in axes.collections if isinstance(each, LineCollection)]
-    ways: list[Any] = [np.concatenate(route.get_segments()) for route in routes]
-    ways += [line.get_xydata() for line in axes.lines if line.get_linestyle() != "None"]
-    marks = [line.get_xydata() for line in axes.lines if line.get_linestyle() == "None"]
-    to_pixels = axes.transData.transform
-    lines = [MatplotlibPath(to_pixels(way)) for way in ways if len(way)]
-    return lines, np.asarray(to_pixels(np.concatenate([np.empty((0, 2)), *marks])))
+    ways = [np.concatenate(route.get_segments()) for route in routes]
+    ways += [np.asarray(line.get_xydata()) for line in axes.lines]
+    lines = [MatplotlibPath(axes.transData.transform(way)) for way in ways if len(way)]
+    paper = axes.get_window_extent()
+    taken: list[Any] = []
+    for k, (text, place) in enumerate(texts):
+        shown = axes.annotate(
+            text, place, (0, 0), textcoords="offset points", fontsize=9 if k < always else 8,
+            zorder=6, bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
+        )  # fmt: skip
+        tried = []
+        for side in _SIDES:
+            shown.set(**side)
+            box = shown.get_window_extent()
+            outside = not (paper.contains(*box.min) and paper.contains(*box.max))
+            clear = box.padded(_CLEAR * figure.dpi / 72)
+            covers = sum(line.intersects_bbox(clear, filled=False) for line in lines)
+            covers += sum(clear.count_contains(line.vertices) for line in lines)
+            tried.append(((outside, clear.count_overlaps(taken), covers), side, box))
+        covered, side, box = min(tried, key=lambda each: each[0])
+        if any(covered) and k >= always:
+            shown.remove()
+        else:
+            shown.set(**side)
+            taken.append(box)
 
 
 def render(figure: "Figure", suffix: str) -> bytes:

@@ -11,7 +11,6 @@ from faao_mav.errors import counted
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
-from faao_mav.schedule.precoder_table import taken_by
 from faao_mav.schedule.prediction import Prediction
 from faao_mav.validate import Check, Level
 from faao_mav.validate.demands import LATE_START
@@ -38,15 +37,13 @@ def joined(lines: Iterable[Line]) -> str:
 def summary(
     result: Result,
     written: Sequence[Path] = (),
-    precoder_table: Path | None = None,
     *,
     verbose: bool = False,
 ) -> str:
     """Return the text that the main job prints: `result`, and the files that were `written`.
 
     The first line is for who flies: what arrives, in how long, whether the mission keeps it and
-    whether anything is wrong. `verbose` adds what a researcher looks at. Of a `precoder_table`
-    among the files it says which rows a late aircraft takes.
+    whether anything is wrong. `verbose` adds what a researcher looks at.
     """
     lines: list[Line] = []
     topic = ""
@@ -56,9 +53,8 @@ def summary(
         if verbose or failed or topic not in _RESEARCH:
             lines.append((label, text))
     lines += _checked(result)
-    rows = f" (a late aircraft takes the row of the {taken_by(result.solution.plan)})"
-    names = ", ".join(f"{path}{rows if path == precoder_table else ''}" for path in written)
-    lines.append(("files", names or "none: give --out MISSION.waypoints"))
+    names = ", ".join(map(str, written)) or "none: give --out MISSION.waypoints"
+    lines.append(("files", names))
     return "\n".join([_headline(result), joined(lines)])
 
 
