@@ -5,7 +5,6 @@ Everything here takes and returns what can be sent between processes.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,18 +14,18 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.mission.fence_area import Area
-from faao_mav.optimizer.rough import RoughFlight, rough_flight
+from faao_mav.optimizer.rough import RoughFlight
 from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.sections import PolygonZone
 from faao_mav.report.figures import of_a_slot
-from faao_mav.report.maps import WAYPOINTS, placed_items
+from faao_mav.report.maps import WAYPOINTS, placed_items, thinned
 from faao_mav.report.page import write_part
 from faao_mav.report.style import SPEEDS
 from faao_mav.validate.demands import energy_use
 from faao_mav.vector import lengths
-from faao_mav.workflow import Result, plan_mission
+from faao_mav.workflow import Result
 
 FILES = {
     "mission.waypoints": ("Mission, QGC WPL 110 (.waypoints)", ""),
@@ -40,11 +39,6 @@ FILES = {
 }
 """What can be had of a finished answer: by its name, or for what lies beside a mission what is in
 its name, what it is called, and which part of `write_part` it is."""
-
-_GREY = "#888"
-_COLOURS = ("#3b7ddd", "#d9731a", "#2a9d5c")  # of the curves of a chart, in their order
-
-_MOST_DRAWN = 400  # points of a line on the map and of a chart: more cannot be told apart. Chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +62,8 @@ class Answer:
     result: Result | None = None
 
 
-def rough(text: str, source: str, near: Real | None) -> Answer:
-    """Return the rough answer to the plan `text`, from a flight `near` it where there is one."""
-    return _answered(text, source, partial(rough_flight, near=near))
-
-
-def finished(text: str, source: str) -> Answer:
-    """Return the answer of the command line to the plan `text`."""
-    return _answered(text, source, plan_mission)
-
-
-def _answered(text: str, source: str, solve: Callable[[Plan], RoughFlight | Result]) -> Answer:
+def answer(text: str, source: str, solve: Callable[[Plan], RoughFlight | Result]) -> Answer:
+    """Return what `solve` finds for the plan `text`, or why it finds nothing."""
     try:
         found = solve(parse_plan(text, source))
     except PlanError as error:
@@ -141,12 +126,6 @@ def _zones_of_file(plan: Plan) -> list[Area]:
     return [*plan.zones[drawn:polygons], *plan.zones[polygons + len(own) - drawn :]]
 
 
-def thinned(values: Real) -> Real:
-    """Return at most `_MOST_DRAWN` of `values` (n, ...), the first and the last among them."""
-    kept = np.linspace(0, len(values) - 1, min(len(values), _MOST_DRAWN)).round().astype(int)
-    return np.asarray(values[kept])
-
-
 def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> list[dict[str, Any]]:
     """Return the charts of `flight` over time, s, with what arrives `under` shadowing."""
     plan, relayed = flight.plan, flight.relayed
@@ -168,26 +147,19 @@ def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> lis
 
 
 def _chart(t: Real, unit: str, curves: dict[str, Real]) -> dict[str, Any]:
-    axis = {"type": "value", "splitNumber": 3, "axisLabel": {"color": _GREY},
-            "splitLine": {"lineStyle": {"color": _GREY, "opacity": 0.2}}}  # fmt: skip
-    titled = {"name": unit, "nameGap": 8, "nameTextStyle": {"align": "left", "color": _GREY}}
-    points = {name: np.stack([t, curve], axis=1) for name, curve in curves.items()}
+    points = {name: thinned(np.stack([t, curve], axis=1)) for name, curve in curves.items()}
     return {
         "animation": False,
-        "color": _COLOURS,
-        "tooltip": {"trigger": "axis", "confine": True, "padding": 4,
-                    "textStyle": {"fontSize": 11}},
-        "legend": {"top": 0, "right": 10, "icon": "roundRect", "itemHeight": 4,
-                   "textStyle": {"color": _GREY}},
-        "grid": {"left": 45, "right": 15, "top": 30, "bottom": 22},
-        "xAxis": {**axis, "max": "dataMax"},
-        "yAxis": {**axis, **titled, "min": 0},
+        "tooltip": {},
+        "legend": {"top": 0, "right": 10},
+        "grid": {},
+        "xAxis": {"type": "value", "max": "dataMax"},
+        "yAxis": {"type": "value", "name": unit, "min": 0},
         "series": [
-            {"type": "line", "name": name, "showSymbol": False,
-             "data": thinned(curve).round(4).tolist()}
+            {"type": "line", "name": name, "data": curve.round(4).tolist()}
             for name, curve in points.items()
         ],
-    }  # fmt: skip
+    }
 
 
 def made(result: Result, wanted: str) -> tuple[str, bytes]:

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
+from ruamel.yaml.util import load_yaml_guess_indent
 
 from faao_mav.errors import PlanError
 from faao_mav.files import read_text, write_whole
@@ -20,10 +21,7 @@ Step: TypeAlias = str | int
 Path: TypeAlias = tuple[Step, ...]
 """Keys and numbers of list entries from the top of a plan."""
 
-_INDENT = re.compile(r"^( +)[^\s#-]", re.MULTILINE)
-_BEFORE_DASH = re.compile(r"^( *)[^\s#-][^\n]*:[ ]*\n( *)- ", re.MULTILINE)
-"""How far a text indents the keys of a section, and a list's dashes from the list's key."""
-
+_INDENT = re.compile(r"^( +)[^\s#-]", re.MULTILINE)  # how far keys of a section are indented
 _WIDTH = 4096  # characters of a line at which long values are folded. Chosen
 
 
@@ -53,8 +51,10 @@ class Document:
         self._on_disk = text
 
     @classmethod
-    def open(cls, path: File) -> "Document":
-        """Return the plan of the file `path`; raises `PlanError` where it is none."""
+    def open(cls, path: File | None) -> "Document":
+        """Return the plan of the file `path`, or a new one; raises `PlanError` where it is none."""
+        if path is None:
+            return cls(File(__file__).with_name("new.yaml").read_text(encoding="utf-8"))
         return cls(_read(path), str(path), path)
 
     @property
@@ -169,14 +169,12 @@ class Document:
     @contextmanager
     def _edited(self, gesture: object = None) -> Iterator[Any]:
         """Give the data to change; their text becomes the document's, if a plan may have it."""
-        yaml = YAML()
-        indent, before = _INDENT.search(self.text), _BEFORE_DASH.search(self.text)
-        mapping = len(indent[1]) if indent else 2
-        offset = len(before[2]) - len(before[1]) if before else 0
-        yaml.indent(mapping=mapping, sequence=offset + 2, offset=offset)
+        yaml, written = YAML(), io.StringIO()
         yaml.brace_single_entry_mapping_in_flow_sequence = True
         yaml.preserve_quotes, yaml.width = True, _WIDTH
-        data, written = yaml.load(self.text), io.StringIO()
+        data, _, dashes = load_yaml_guess_indent(self.text, yaml=yaml)
+        keys, offset = _INDENT.search(self.text), dashes or 0
+        yaml.indent(mapping=len(keys[1]) if keys else 2, sequence=offset + 2, offset=offset)
         yield data
         yaml.dump(data, written)
         if (text := written.getvalue()) == self.text:

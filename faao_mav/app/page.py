@@ -1,5 +1,6 @@
 """The page of one window: the map, the plan beside it, what the flight delivers, and its files."""
 
+import json
 from collections.abc import Callable
 from functools import partial
 from importlib.resources import files
@@ -26,14 +27,8 @@ _SHAPES = (
 )
 """Shape of a zone, icon of the button that begins one, and how it is drawn."""
 
-_STATES = {
-    "computing": "computing",
-    "rough": "rough, computing",
-    "finished": "finished",
-    "refused": "not a plan yet",
-    "failed": "no flight",
-}
-"""What the page says of the answer that it shows."""
+_LOOKS = json.loads(files("faao_mav.app").joinpath("charts.json").read_text(encoding="utf-8"))
+"""The theme of ECharts for the charts of a flight."""
 
 _LEAFLET = Path(nicegui.__file__).parent / "elements" / "leaflet" / "dist"
 """Leaflet as NiceGUI brings it along."""
@@ -154,8 +149,7 @@ class Page:
         self._planner.ask(document.text, document.source, soon=soon)
 
     def _say(self, state: str) -> None:
-        self._state.text = _STATES[state]
-        self._state.props["data-state"] = state
+        self._state.text = self._state.props["data-state"] = state
         self._state.update()
 
     def _show(self, answer: Answer) -> None:
@@ -168,7 +162,7 @@ class Page:
         self._answer = answer
         if not answer.drawing:
             self._rate.text = ""
-            self._say("refused" if problems else "failed")
+            self._say("not a plan yet" if problems else "no flight")
             self._map.run_method("clear_flight")
             self._draw_charts()
             self._results.clear()
@@ -177,7 +171,7 @@ class Page:
         data = "" if answer.megabytes is None else f", {answer.megabytes:,.1f} MB"
         self._rate.text = f"{answer.delivered:.4f} bit/s/Hz{data}"
         self._rate.props["data-delivered"] = repr(answer.delivered)
-        self._say("rough" if answer.result is None else "finished")
+        self._say("rough, computing" if answer.result is None else "finished")
         self._map.run_method("flight", answer.drawing)
         self._draw_charts()
         self._slider.props["max"] = len(answer.drawing["times"]) - 1
@@ -200,7 +194,7 @@ class Page:
             return
         self._chart_box.clear()
         with self._chart_box:
-            self._charts = [ui.echart(chart) for chart in charts]
+            self._charts = [ui.echart(chart, theme=_LOOKS) for chart in charts]
 
     def _draw_scene(self, *, fit: bool = False) -> None:
         scene = Scene(self._document)

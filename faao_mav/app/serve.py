@@ -165,7 +165,7 @@ class TileFile:
 
 @apart_from_the_current_directory()
 def serve(
-    begin: Callable[[], Document],
+    plan: Path | None,
     *,
     host: str,
     port: int,
@@ -173,7 +173,7 @@ def serve(
     tiles: TileFile | None,
     note: Callable[[str], None],
 ) -> None:
-    """Serve the page until interrupted; each window `begin`s with a document of its own.
+    """Serve the page until interrupted; each window begins with a document of its own of `plan`.
 
     `port` 0 stands for any that is free. `tiles` are served as the background map in the stead of
     OpenStreetMap's. `note` is told the address, with the token in it; with
@@ -186,7 +186,8 @@ def serve(
     @ui.page("/", title="faao-mission")
     def page() -> None:
         try:
-            Page(begin(), workers, tiles.background if tiles else _OPEN_STREET_MAP).build()
+            background = tiles.background if tiles else _OPEN_STREET_MAP
+            Page(Document.open(plan), workers, background).build()
         except FaaoError as error:  # the file is another one by now
             ui.label(str(error))
 

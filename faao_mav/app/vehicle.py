@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from faao_mav.app.answers import thinned
 from faao_mav.errors import FaaoError, PlanError
+from faao_mav.report.maps import thinned
 from faao_mav.report.summary import joined
 from faao_mav.schedule.conversion import beyond_vehicle
 from faao_mav.workflow import Result

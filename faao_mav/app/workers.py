@@ -12,13 +12,15 @@ from collections.abc import Awaitable, Callable
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from faao_mav.app import answers
-from faao_mav.app.answers import Answer
+from faao_mav.app.answers import Answer, answer
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
+from faao_mav.optimizer.rough import rough_flight
+from faao_mav.workflow import plan_mission
 
 T = TypeVar("T")
 
@@ -184,22 +186,22 @@ class Planner:
     async def _answer_roughly(self) -> None:
         question = 0
         while question < self._asked:
-            question = self._asked
-            answer = await _told(self._workers.short(answers.rough, *self._plan, self._near))
+            question, solve = self._asked, partial(rough_flight, near=self._near)
+            found = await _told(self._workers.short(answer, *self._plan, solve))
             # the finished answer says whether there is a flight
-            if not answer.failed and question > self._answered:
-                self._take(answer)
+            if not found.failed and question > self._answered:
+                self._take(found)
 
     async def _finish(self, rest: float) -> None:
         await asyncio.sleep(rest)
-        answer = await _told(self._workers.long(answers.finished, *self._plan))
+        found = await _told(self._workers.long(answer, *self._plan, plan_mission))
         self._answered = self._asked
-        self._take(answer)
+        self._take(found)
 
-    def _take(self, answer: Answer) -> None:
-        if answer.velocities is not None:
-            self._near = answer.velocities
-        self._show(answer)
+    def _take(self, found: Answer) -> None:
+        if found.velocities is not None:
+            self._near = found.velocities
+        self._show(found)
 
 
 async def _told(job: Awaitable[Answer]) -> Answer:

@@ -84,7 +84,7 @@ def plan(
         cli.show(
             lambda: result.as_dict() | {"upload": as_dict(uploaded) if uploaded else None},
             lambda: [
-                summary(result, written, precoders, verbose=verbose),
+                summary(result, written, verbose=verbose),
                 *([str(uploaded)] if uploaded else []),
             ],
             as_json=as_json,

@@ -14,20 +14,6 @@ if TYPE_CHECKING:
     from faao_mav.sim import MockAutopilot
     from faao_mav.sim.faults import Faults
 
-_EMPTY = """\
-name: new relay
-site:
-  origin: {latitude: -35.363262, longitude: 149.165237, elevation: 584}
-vehicle: {max_speed: 8, max_acceleration: 1.5}
-flight: {start: [0, 350], end: [350, 0], altitude: 100, duration: 120, time_step: 0.5}
-radio:
-  base_station: {position: [0, 0], power_dbm: 10}
-  relay: {power_dbm: 10, noise_dbm: -91}
-  ground_user: {position: [300, 300], noise_dbm: -91}
-  modulation: qpsk
-"""
-"""The plan that the page begins with where none is given."""
-
 _HIGHEST = 100_000.0
 """The greatest altitude of a home, m: chosen, where space begins; the wire carries millimetres."""
 
@@ -58,15 +44,12 @@ def app(
     from faao_mav.app.document import Document
     from faao_mav.errors import check_extra
 
-    def begin() -> Document:
-        return Document(_EMPTY) if plan_file is None else Document.open(plan_file)
-
-    begin()  # what is no plan is refused at once
+    Document.open(plan_file)  # what is no plan is refused at once
     check_extra("app", "nicegui", "the planner page")
     from faao_mav.app.serve import TileFile, serve
 
     tiles = None if mbtiles is None else TileFile(mbtiles)
-    serve(begin, host=host, port=port, browser=not no_browser, tiles=tiles, note=cli.note)
+    serve(plan_file, host=host, port=port, browser=not no_browser, tiles=tiles, note=cli.note)
 
 
 def _faults(

@@ -33,16 +33,18 @@ vanish on white and on black paper."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # of curves, in the order of `SERIES`
 WIDTH = 4.2  # inches: a page makes a figure as wide as a phone, where 9 points must still be read
 
-_AWAY, _CLEAR = 5.0, 2.5
-"""Points from a place to its text, and from a text to lines and other texts. Chosen."""
+_CLEAR = 2.5  # points from a text to lines and other texts. Chosen
 _SIDES: list[dict[str, Any]] = [
-    {"position": (_AWAY * x, _AWAY * y), "ha": across, "va": up}
-    for (x, across), (y, up) in itertools.product(
-        ((1, "left"), (-1, "right"), (0, "center")), ((1, "bottom"), (-1, "top"), (0, "center"))
+    {"position": (away * x, away * y), "ha": across, "va": up}
+    for away, (x, across), (y, up) in itertools.product(
+        (4.0, 16.0),  # points. Chosen: beside the map's widest line, of 5 points, texts stay clear
+        ((1, "left"), (-1, "right"), (0, "center")),
+        ((1, "bottom"), (-1, "top"), (0, "center")),
     )
     if x or y
 ]
-"""The sides of a place on which a text may stand, from the first that is tried on."""
+"""Where a text may stand beside its place, from the first that is tried on: eight sides, near and
+for one that is not left out farther too."""
 
 _ROLES = {INK: "--ink", MUTED: "--muted", GRID: "--grid", PAPER: "--paper"} | {
     colour: f"--s{k}" for k, colour in enumerate(SERIES)
@@ -140,7 +142,7 @@ def write_beside(axes: "Axes", texts: Sequence[tuple[str, Any]], always: int = 0
             zorder=6, bbox={"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 1.0},
         )  # fmt: skip
         tried = []
-        for side in _SIDES:
+        for side in _SIDES if k < always else _SIDES[:8]:
             shown.set(**side)
             box = shown.get_window_extent()
             outside = not (paper.contains(*box.min) and paper.contains(*box.max))

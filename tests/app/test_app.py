@@ -268,7 +268,7 @@ def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
     window.get_by_role("tab", name="Plan").click()
     window.get_by_text("vehicle", exact=True).click()
     enter(window, "max_speed, m/s", "-1")
-    window.locator(".state[data-state=refused]").wait_for()
+    window.locator(".state[data-state='not a plan yet']").wait_for()
     with pytest.raises(PlanError) as error:
         parse_plan(PLAN.replace("max_speed: 10", "max_speed: -1"), "plan.yaml")
     said = str(error.value).removeprefix("plan.yaml: vehicle.max_speed: ")

@@ -3,17 +3,18 @@
 import asyncio
 import os
 import time
-from collections.abc import Callable
-from functools import partial
+from functools import partial, partialmethod
 from typing import Any
 
 import pytest
 from conftest import FLYABLE, edited
 
-from faao_mav.app import answers, workers
-from faao_mav.app.answers import Answer
+from faao_mav import plan_mission
+from faao_mav.app import workers
+from faao_mav.app.answers import Answer, answer
 from faao_mav.app.workers import Planner, Workers
 from faao_mav.errors import FaaoError
+from faao_mav.optimizer.rough import rough_flight
 
 
 class Held:
@@ -22,12 +23,13 @@ class Held:
     def __init__(self) -> None:
         self.jobs: dict[str, asyncio.Future[Answer]] = {}
 
-    async def short(self, work: Callable[..., Any], text: str, *_: Any) -> Answer:
-        job = f"{work.__name__} {text}"
+    async def short(self, *asked: Any, kind: str = "rough") -> Answer:
+        _, text, *_ = asked
+        job = f"{kind} {text}"
         self.jobs[job] = asyncio.get_running_loop().create_future()
         return await self.jobs[job]
 
-    long = short
+    long = partialmethod(short, kind="finished")
 
     async def answer(self, job: str, answer: Answer | Exception | None = None) -> None:
         await asyncio.sleep(0.001)
@@ -95,7 +97,7 @@ def test_a_long_job_ends_with_its_wait_and_its_death_is_told() -> None:
 
 def test_with_a_spread_the_finished_chart_of_what_is_delivered_tells_what_arrives() -> None:
     text = edited(FLYABLE, {"radio.causal": True, "radio.gain.spread_db": 6.0})
-    found = answers.finished(text, "p")
+    found = answer(text, "p", plan_mission)
     assert found.result is not None
     assert found.result.shadowed is not None
     curves = [curve for chart in found.charts for curve in chart["series"]]
@@ -103,5 +105,5 @@ def test_with_a_spread_the_finished_chart_of_what_is_delivered_tells_what_arrive
     quantiles = found.result.shadowed.quantiles
     for name, rate in (("more in 9 of 10", quantiles[0.1]), ("more in 1 of 10", quantiles[0.9])):
         assert ends[name] == pytest.approx(10 * rate, abs=1e-3)
-    rough = [curve for chart in answers.rough(text, "p", None).charts for curve in chart["series"]]
+    rough = [curve for chart in answer(text, "p", rough_flight).charts for curve in chart["series"]]
     assert [curve["name"] for curve in rough] == [name for name in ends if "of 10" not in name]
