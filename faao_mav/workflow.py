@@ -264,6 +264,8 @@ def debriefing_as_dict(found: Debriefing) -> dict[str, Any]:
         "flown": flight_as_dict(plan, found.flown),
         "start": found.start,
         "missing": found.missing,
+        "from_end": found.from_end,
+        "broken_off": found.broken_off,
         "altitude_error": found.altitude_error,
     }
 

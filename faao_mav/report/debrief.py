@@ -36,15 +36,16 @@ def flight_lines(report: "FlightReport", found: Debriefing | None) -> Iterator[L
 
 def _debriefing_lines(found: Debriefing) -> Iterator[Line]:
     """Yield what became of a plan, hop by hop: planned, predicted and flown."""
+    if found.missing > 0:
+        told = f"of the plan's last {found.missing:.1f} s there is no flight; until then "
+        told += f"{100 * found.seen:.2f} % of what is planned had arrived. Below the aircraft counts "
+        yield "incomplete", f"{told}as staying where it was seen last"
+    if found.broken_off:
+        told = f"the flight came no nearer to flight.end than {found.from_end:.0f} m: below counts "
+        yield "broken off", f"{told}what it did instead until the plan's end"
     for name, flight in (("predicted", found.predicted), ("flown", found.flown)):
         yield from zip((name, "", "", ""), beside(found.solution, flight), strict=True)
     yield "height", f"at most {found.altitude_error:.1f} m from the planned one"
-    if found.missing > 0:
-        yield (
-            "incomplete",
-            f"of the plan's last {found.missing:.1f} s there is no flight: counted as if the "
-            "aircraft had stayed where it was seen last",
-        )
 
 
 def debrief(log: str | Path, solution: Solution, system: int | None = None) -> "FromLog":

@@ -140,7 +140,8 @@ class Debriefing:
 
     The plan's clock reads 0 at `start` s of the flight's. `missing` is for how many seconds of the
     plan there is no flight: the aircraft then counts as staying where it was seen last.
-    `altitude_error` is the greatest distance, m, from the planned height.
+    `altitude_error` is the greatest distance, m, from the planned height. From `around_end` before
+    the plan's end on it came to w_F within `from_end` m.
     """
 
     solution: Solution
@@ -149,6 +150,19 @@ class Debriefing:
     start: float
     missing: float
     altitude_error: float
+    from_end: float
+
+    @property
+    def broken_off(self) -> bool:
+        """Whether the flight was not flown to its end."""
+        return self.missing == 0 and self.from_end > threshold.broken_off
+
+    @property
+    def seen(self) -> float:
+        """What had been delivered where the flight ends, as a share of the plan's; 1: all of it."""
+        slots = round(len(self.solution.t) * (1 - self.missing / float(self.solution.t[-1])))
+        planned = self.solution.delivered_rate * len(self.solution.t)
+        return float(self.flown.relayed.forwarded[:slots].sum()) / planned if planned else 1.0
 
 
 def debriefing(
@@ -163,6 +177,7 @@ def debriefing(
     if start is None:
         return None
     flight = record.line(solution, start)
+    ends = min(float(solution.t[-1]) - threshold.around_end, float(flight.t[-1]))
     return Debriefing(
         solution=solution,
         predicted=predicted.priced(solution),
@@ -170,6 +185,7 @@ def debriefing(
         start=start,
         missing=max(0.0, float(solution.t[-1] - flight.t[-1])),
         altitude_error=flight.altitude_error(solution),
+        from_end=float(lengths(flight.w[flight.t >= ends] - solution.w[-1]).min()),
     )
 
 

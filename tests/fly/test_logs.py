@@ -124,6 +124,9 @@ def test_a_log_that_ends_in_the_middle_is_told_as_far_as_it_goes(
     found = debriefed(cut, "px4").found
     assert found.start == pytest.approx(start, abs=0.02)
     assert found.missing == pytest.approx(60 - 0.5 - 40, abs=0.5)
+    until = found.solution.relayed.forwarded[: round(40 / 0.5)].sum()
+    assert found.seen == pytest.approx(until / found.solution.relayed.forwarded.sum(), rel=0.02)
+    assert not found.broken_off
     cut.write_bytes(ulog(kept(flight, flight.t < start)))
     with pytest.raises(FaaoError, match="the plan's flight is not in it"):
         debriefed(cut, "px4")

@@ -132,7 +132,16 @@ def test_what_became_of_it_is_priced_as_a_prediction_is() -> None:
         assert found.predicted.delivered_rate == pytest.approx(solution.delivered_rate)
         assert found.flown.duration - 45 == pytest.approx(12, abs=0.3)
         assert found.altitude_error == pytest.approx(1.5)
+        assert found.seen == pytest.approx(found.flown.delivered_rate / solution.delivered_rate)
         assert found.missing == 0
+        assert not found.broken_off
+    stays = flight.at(np.minimum(flight.t, 220.0))
+    place = LocalFrame(origin.latitude, origin.longitude).to_geodetic(stays)
+    record = FlightRecord(flight.t, *place, 510.0 + flight.up, home, np.zeros((len(home), 2)), home)
+    found = debriefing(solution, Line.planned(solution), record, 200.0)
+    assert found is not None
+    assert found.broken_off
+    assert found.from_end == pytest.approx(np.linalg.norm(stays[-1] - solution.w[-1]))
 
 
 def test_how_a_flight_stands() -> None:
