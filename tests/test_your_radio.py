@@ -251,6 +251,10 @@ def test_a_law_and_a_precoder_of_ones_own_are_as_the_plans() -> None:
     found = optimize(sample(), gain=Same(named.radio.path_gains[0]), precoder=SCHEMES["mrt"])
     assert found.delivered_rate == pytest.approx(wanted.delivered_rate, rel=1e-5)
     assert found.is_feasible(1e-6)
+    with pytest.raises(InputError, match="precoder: has 4 times the power"):
+        optimize(sample(), precoder=lambda H, W, noise: 2 * SCHEMES["mrt"](H, W, noise))
+    with pytest.raises(InputError, match="expected finite numbers"):
+        optimize(sample(), precoder=lambda H, *_: H[..., :1])
     law, height = PathGain(1e-5, 2.4, (5.0, -30.0, 12.0)), 30.0
     away = np.random.default_rng(0).uniform(-300, 300, (2, 40))
     own, plans = (GainField(each, np.zeros(2), height) for each in (Same(law), law))

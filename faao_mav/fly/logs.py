@@ -108,7 +108,8 @@ def read_log(path: Path, system: int | None = None) -> "list[FlightRecord]":
         text = f"{path}: not read within {_PATIENCE:g} s; expected the log of a flight"
         raise InputError(text) from None
     if read.returncode:
-        reason = read.stderr.decode(errors="replace").strip()
+        said = read.stderr.decode(errors="replace").strip()  # by the libraries too
+        reason = said.rpartition("\n")[2]
         raise InputError(reason or f"{path}: not a {ending} log: its reader was ended")
     return [FlightRecord.of(*each) for each in json.loads(read.stdout)]
 

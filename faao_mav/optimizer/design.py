@@ -12,6 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, RealOrComplex
+from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.channel import line_of_sight_ula, rician
@@ -176,7 +177,7 @@ class Design:
 
         The first axis is that of the draws if `averaged`. The search for optimal ones begins at
         `start` (..., N_t, N_t) where given. A classical scheme that does not know the draw is that
-        of the mean channel.
+        of the mean channel. Raises `InputError` where one's own are none, or above the power.
         """
         power, noise = link.power, link.noise
         if self.optimal:
@@ -184,7 +185,14 @@ class Design:
             return link.best(draws, start)
         H = H.mean(axis=0) if self.blind else H
         scheme = "waterfilling" if self.scheme == "faao" else self.scheme
-        return (self.own or SCHEMES[scheme])(H, power, noise)
+        if self.own is None:
+            return SCHEMES[scheme](H, power, noise)
+        P = np.asarray(self.own(H, power, noise))
+        if P.shape != (*H.shape[:-2], H.shape[-1], H.shape[-1]) or not np.isfinite(P).all():
+            told = f"of shape {P.shape} for channels {H.shape}"
+            raise InputError(f"precoder: {told}; expected finite numbers (..., N_t, N_t)")
+        check_power(P, power, "precoder")
+        return P
 
     def rate(self, link: Link, H: Complex, P: Complex) -> Real:
         """Return the rate that the route is optimised for, bits (n,), its mean where `averaged`."""
@@ -202,6 +210,13 @@ def design(plan: Plan, own: OwnPrecoder | None = None) -> Design:
         blind=averaged and plan.radio.csi == "statistical",
         own=own,
     )
+
+
+def check_power(P: Complex, power: float, source: str) -> None:
+    """Raise `InputError`, which names `source`, for precoders (..., N_t, N_t) above `power`, W."""
+    used = float(np.sum(np.abs(P) ** 2, axis=(-2, -1)).max())
+    if used > power * (1 + 1e-6):
+        raise InputError(f"{source}: has {used / power:.4g} times the power that it may have")
 
 
 def gaussian_rate(H: RealOrComplex, P: RealOrComplex, noise: float) -> Real:

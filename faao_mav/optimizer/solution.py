@@ -13,7 +13,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import InputError, quote
 from faao_mav.files import read_archive, write_whole
-from faao_mav.optimizer.design import Link
+from faao_mav.optimizer.design import Link, check_power
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
@@ -370,8 +370,11 @@ def load_solution(path: str | Path) -> Solution:
         said = quote(str(found["starts"]))
         raise InputError(f"{path}: starts: {said}; expected rates by start") from None
     arrays: dict[str, Any] = {name: found[name] for name in _ARRAYS}
+    problem = build_problem(plan)
+    for name, link in (("P_B", problem.bs_uav), ("P_U", problem.uav_user)):
+        check_power(arrays[name], link.power, f"{path}: {name}")
     return Solution(
-        problem=build_problem(plan),
+        problem=problem,
         converged=bool(found["converged"]),
         ending=str(found["ending"]),
         starts=starts,

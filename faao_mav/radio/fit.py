@@ -159,7 +159,8 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     Of the laws with the exponent 2 or a free one and up to three terms of the elevation it is that
     with the least rms error at what is left out of the fit: each leg in turn and, where several
     heights were flown, each height. More parameters have to pay. Least squares are robust (Huber).
-    Raises `InputError` where there are fewer than ten means in flight, or all at one place.
+    Raises `InputError` where there are fewer than ten means in flight, or all at one place or of
+    one level.
     """
     flown = [flight.means(seconds) for flight in flights]
     t, place, y = (np.concatenate([getattr(f, x) for f in flown]) for x in ("t", "place", "level"))
@@ -169,6 +170,8 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
         raise InputError(f"{source}: {text}; expected at least {_LEAST}, and some of each")
     if np.ptp(place, axis=0).max() < 1.0:
         raise InputError(f"{source}: one place alone; expected a flight")
+    if np.ptp(y) < 1e-6:
+        raise InputError(f"{source}: one level alone, {y[0]:g} dB; expected one that changes")
     leg = _legs(flown)
     height = _heights(place[:, 2], leg)
     d, angle = seen(place)

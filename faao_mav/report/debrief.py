@@ -38,8 +38,8 @@ def _debriefing_lines(found: Debriefing) -> Iterator[Line]:
     """Yield what became of a plan, hop by hop: planned, predicted and flown."""
     if found.missing > 0:
         told = f"of the plan's last {found.missing:.1f} s there is no flight; until then "
-        told += f"{100 * found.seen:.2f} % of what is planned had arrived. Below the aircraft counts "
-        yield "incomplete", f"{told}as staying where it was seen last"
+        told += f"{100 * found.seen:.2f} % of what is planned had arrived. Below the aircraft "
+        yield "incomplete", f"{told}counts as staying where it was seen last"
     if found.broken_off:
         told = f"the flight came no nearer to flight.end than {found.from_end:.0f} m: below counts "
         yield "broken off", f"{told}what it did instead until the plan's end"

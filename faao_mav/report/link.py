@@ -65,7 +65,7 @@ def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = Non
     law = (
         f"# {fit}: d the distance, m, s the sine of the elevation\nabout: {json.dumps(rests_on)}\n"
         f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
-        f"spread_db: {fit.spread_db:.2f}\ncorrelation_m: {fit.correlation_m:.0f}\n"
+        f"spread_db: {max(fit.spread_db, 0.01):.2f}\ncorrelation_m: {fit.correlation_m:.0f}\n"
         f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
     )
     return LinkReport(lines, record, law, above)

@@ -157,9 +157,8 @@ def _rates(result: Result) -> Iterator[Line]:
     rates, delivered, radio = solution.rates, solution.delivered_rate, plan.radio
     half, share = radio.duplex == "half", delivered / rates.R_avg if rates.R_avg else 1.0
     limiting = "alphabet" if solution.problem.uav_user.steps is None else "radio's rates"
-    most = (
-        f", at most {limit.ceiling:.5g} by the {limiting}" if (limit := result.saturation) else ""
-    )
+    ceiling = min(link.most for link in solution.problem.links)
+    most = f", at most {ceiling:.5g} by the {limiting}" if result.saturation else ""
     measure = "" if plan.optimizer.rate == "cutoff" else " of mutual information"
     hops = f"base station to UAV {rates.R_U:.4f}, UAV to user {rates.R_G:.4f}"
     yield "rate", f"{_told_rate(rates.R_avg, radio.bandwidth_mhz)}{most}{measure} ({hops})"

@@ -104,9 +104,13 @@ def test_shares_are_saved_and_read(small_plan: MakePlan, tmp_path: Path) -> None
     assert loaded.delivered_rate == solution.delivered_rate
     with np.load(path) as archive:
         assert archive["forwarded"].mean() == solution.delivered_rate == archive["R_del"]
-        np.savez(tmp_path / "other.npz", **{**archive, "shares": archive["shares"] + 0.5})
-    with pytest.raises(InputError, match=r"shares: expected a number of 0 to 1"):
-        load_solution(tmp_path / "other.npz")
+        for name, value, told in (
+            ("shares", archive["shares"] + 0.5, "shares: expected a number of 0 to 1"),
+            ("P_U", 2 * archive["P_U"], "P_U: has 4 times the power"),
+        ):
+            np.savez(tmp_path / "other.npz", **{**archive, name: value})
+            with pytest.raises(InputError, match=told):
+                load_solution(tmp_path / "other.npz")
 
 
 FOR_IT = {"optimizer.rate": "mutual_information", "radio.modulation": "qpsk", "power": 5}

@@ -116,6 +116,8 @@ def test_no_flight_is_refused() -> None:
     (some,) = levels([flight(50.0)], (-45.0, 2.0), 3.0, 30.0, 2)
     with pytest.raises(InputError, match="one place alone"):
         fit_link([replace(some, place=0 * some.place + 40.0)])
+    with pytest.raises(InputError, match="one level alone, 5 dB"):
+        fit_link([replace(some, level=0 * some.level + 5.0)])
     some = Samples(some.t[:20], some.place[:20], some.level[:20], "f.csv")
     with pytest.raises(InputError, match=r"f\.csv: 5 means over 2 s in flight"):
         fit_link([some])

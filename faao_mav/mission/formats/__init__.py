@@ -5,6 +5,7 @@ this program wrote say so in a comment, and go when the mission is another one; 
 origin are not touched.
 """
 
+import errno
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -204,6 +205,8 @@ def remove_outdated(beside: Path) -> None:
         if _is_of_a_run(beside):
             beside.unlink()
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:  # nothing can be there
+            return
         raise InputError(
             f"{beside}: is of an earlier mission and cannot be removed: {error.strerror}"
         ) from None
