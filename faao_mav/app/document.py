@@ -11,7 +11,6 @@ from typing import Any, TypeAlias
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import YAMLError
-from ruamel.yaml.util import load_yaml_guess_indent
 
 from faao_mav.errors import PlanError
 from faao_mav.files import read_text, write_whole
@@ -21,7 +20,10 @@ Step: TypeAlias = str | int
 Path: TypeAlias = tuple[Step, ...]
 """Keys and numbers of list entries from the top of a plan."""
 
-_INDENT = re.compile(r"^( +)[^\s#-]", re.MULTILINE)  # how far keys of a section are indented
+_INDENT = re.compile(r"^( +)[^\s#-]", re.MULTILINE)
+_DASHES = re.compile(r"^( *)[^\s#-][^\n]*:[ ]*(?:#.*)?\n\s*?( *)- ", re.MULTILINE)
+"""How far a text indents the keys of a section, and a list's dashes from the list's key."""
+
 _WIDTH = 4096  # characters of a line at which long values are folded. Chosen
 
 
@@ -172,9 +174,10 @@ class Document:
         yaml, written = YAML(), io.StringIO()
         yaml.brace_single_entry_mapping_in_flow_sequence = True
         yaml.preserve_quotes, yaml.width = True, _WIDTH
-        data, _, dashes = load_yaml_guess_indent(self.text, yaml=yaml)
-        keys, offset = _INDENT.search(self.text), dashes or 0
+        keys, dashes = _INDENT.search(self.text), _DASHES.search(self.text)
+        offset = len(dashes[2]) - len(dashes[1]) if dashes else 0
         yaml.indent(mapping=len(keys[1]) if keys else 2, sequence=offset + 2, offset=offset)
+        data = yaml.load(self.text)
         yield data
         yaml.dump(data, written)
         if (text := written.getvalue()) == self.text:

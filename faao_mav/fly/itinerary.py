@@ -166,7 +166,8 @@ class Gate:
         self._fence, self._speed = plan.keep_in, plan.max_ground_speed
         self._acceleration = plan.vehicle.max_acceleration
         self._on_course: float | None = None
-        self._believed: tuple[float, Real] | None = None
+        self._last: tuple[float, Real] | None = None
+        self._jumped_from: tuple[float, Real] | None = None
         self._moved, self._doubted_since = 0.0, math.inf
         self.has_lost_it = False
         """Whether its places have been doubted for too long."""
@@ -193,14 +194,16 @@ class Gate:
 
         After a jump it is doubted until it jumps back; so is one that moves and stays where it is.
         """
-        since, before = self._believed or (t, place)
-        if self._believed is None or np.linalg.norm(velocity) < _MOVES or (place != before).any():
+        last, self._last = self._last, (t, place)
+        if last is None or np.linalg.norm(velocity) < _MOVES or (place != last[1]).any():
             self._moved = t
+        if last is not None and self._jumps(last, t, place):
+            if self._jumped_from is None:
+                self._jumped_from = last
+            elif not self._jumps(self._jumped_from, t, place):
+                self._jumped_from = None
         stands = t - self._moved >= _STANDS
-        within = _AROUND + _QUICKER * self._speed * (t - since)
-        doubted = stands or np.linalg.norm(place - before) > within
-        if not doubted:
-            self._believed = t, place
+        doubted = stands or self._jumped_from is not None
         if doubted and self._doubted_since == math.inf:
             self._doubted_since = t
             why = "does not change, though it moves" if stands else "has jumped"
@@ -210,6 +213,10 @@ class Gate:
             self._tell("its place is believed again")
         self.has_lost_it = t >= self._doubted_since + _BORNE
         return not doubted
+
+    def _jumps(self, before: tuple[float, Real], t: float, place: Real) -> bool:
+        within = _AROUND + _QUICKER * self._speed * (t - before[0])
+        return float(np.linalg.norm(place - before[1])) > within
 
 
 def _lag(seconds: float, speed: float, acceleration: float) -> float:
