@@ -28,6 +28,9 @@ def test_a_change_leaves_comments_and_all_other_values() -> None:
         assert load_yaml(document.text, "p") == wanted, path
         if path.stem == "fenced_relay":
             assert document.text == text.replace("altitude: 100", "altitude: 77.5")
+    document = Document("name: a\nstudy:\n  schemes:  # these\n    - faao\n")
+    document.write(("name",), "b")
+    assert document.text == "name: b\nstudy:\n  schemes:  # these\n    - faao\n"
 
 
 def test_values_are_written_removed_undone_and_done_again() -> None:
