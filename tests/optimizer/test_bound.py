@@ -110,6 +110,18 @@ def test_a_zone_over_a_station_lowers_the_bound(bounded: Callable[[str], Bounded
     assert found < most - 1e-2
 
 
+def test_instants_of_a_flight_may_be_few(
+    bounded: Callable[[str], Bounded], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = bounded("free ends")
+    for instants in (1, 2, 3):
+        monkeypatch.setattr("faao_mav.optimizer.search.axis_bound.MOST_INSTANTS", instants)
+        cells = AxisBound(one.problem, one.best, 6, 4)
+        assert len(cells.t) == instants
+        for seed in range(3):
+            assert one.value(random_flight(one.problem.kinematics, seed).w) <= cells.bound([0.5])
+
+
 @pytest.mark.parametrize("kind", ["R_avg", "free ends", "fast"])
 @settings(max_examples=6)
 @given(seed=st.integers(0, 2**31))

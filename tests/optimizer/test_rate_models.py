@@ -142,6 +142,11 @@ def test_models_have_the_rate_of_every_place_and_its_slopes(
         differs(link, rate, w, curvature=1e-2 if link.steps is None else 2e-2)
 
 
+def test_a_radio_may_have_one_rate_alone(small_plan: MakePlan) -> None:
+    plan = small_plan({"radio.rates": {"snr_db": [8], "bit_per_s_per_hz": [1]}})
+    assert rate_field(build_problem(plan), design(plan)).links[0].steps.most == 1
+
+
 SPREAD: dict[str, Any] = {
     "radio.gain": {"spread_db": 6, "correlation_m": 25},
     "radio.fading": "none",

@@ -149,7 +149,7 @@ def rate_field(problem: Problem, design: Design, width: float | None = None) -> 
     """
     links = problem.links
     if isinstance(steps := links[0].steps, RateSteps):
-        steps = steps.widened(width or max(_LEAST_WIDTH, *np.diff(steps.snr_db)))
+        steps = steps.widened(width or max([_LEAST_WIDTH, *np.diff(steps.snr_db)]))
         links = replace(links[0], steps=steps), replace(links[1], steps=steps)
     tabled = [link for link in links if kind_of(link, design)]
     spans = [np.array(link.gains.extremes(problem.farthest(link))) for link in tabled]
