@@ -147,6 +147,13 @@ def test_a_radio_may_have_one_rate_alone(small_plan: MakePlan) -> None:
     assert rate_field(build_problem(plan), design(plan)).links[0].steps.most == 1
 
 
+def test_one_gain_alone_has_a_table(small_plan: MakePlan) -> None:
+    plan = small_plan({"radio.fading": "none"})
+    link = replace(build_problem(plan).bs_uav, power=1.0, noise=1.0)
+    rate = table_rates([(link, np.zeros(2))], design(plan))[0]
+    assert np.isfinite(value_of(link, rate)(places(link))).all()
+
+
 SPREAD: dict[str, Any] = {
     "radio.gain": {"spread_db": 6, "correlation_m": 25},
     "radio.fading": "none",

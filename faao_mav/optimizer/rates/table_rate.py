@@ -192,7 +192,7 @@ def _table(link: Link, kind: Kind, design: Design, low: float, high: float) -> T
     if link.steps is not None:
         every = max(every, math.ceil(_WHOLE * _PER_RISE / (PER_DB * link.steps.width)))
     first = math.floor(low / _WHOLE)
-    steps = math.ceil(high / _WHOLE) - first
+    steps = max(1, math.ceil(high / _WHOLE) - first)  # one gain alone may be a whole number
     x = _WHOLE * np.linspace(first, first + steps, steps * every + 1)
     unit = replace(link, power=1.0, noise=1.0)
     y = np.zeros(1)
