@@ -191,8 +191,6 @@ def saturation(solution: Solution) -> Saturation:
     >>> saturation(optimize(plan)).saturated
     False
     """
-    from scipy.optimize import brentq  # slow to load
-
     problem, n = solution.problem, len(solution.w)
     full = np.array([[link.most] for link in problem.links])
     ceiling = problem.value(full.repeat(n, axis=1))
@@ -203,4 +201,6 @@ def saturation(solution: Solution) -> Saturation:
 
     if spare(0.0) < 0:
         return Saturation(ceiling, 0.0)
+    from scipy.optimize import brentq  # slow to load
+
     return Saturation(ceiling, float(brentq(spare, 0.0, _MAX_SPARE_DB)))
