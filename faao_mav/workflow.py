@@ -158,13 +158,14 @@ class Result:
         information, fresh, under = self.information, self.fresh, self.shadowed
         flown, energy = self.prediction, self.check and self.check.energy
         mission = predicted = None
-        if conversion is not None and flown is not None:
+        if conversion is not None:
             mission = {
                 "items": len(conversion.mission.items),
-                "duration": flown.duration,
+                "duration": flown and flown.duration,
                 "distance": conversion.schedule.route.distance,
                 "parameters": dict(conversion.parameters),
             }
+        if conversion is not None and flown is not None:
             predicted = flight_as_dict(plan, flown) | {"assumption": conversion.vehicle.assumption}
         return {
             "name": plan.name,

@@ -128,9 +128,11 @@ class _Terrain:
         frequency, heights, paths = self.frequency, self.heights, self.terrain or ()
         if frequency is None or not 30 <= frequency <= 100_000:
             raise InputError("--frequency: expected MHz, 30 to 100000, for --terrain")
+        from faao_mav.plan.sections import HIGHEST
+
         wanted = f"--heights {heights}: expected metres that rise, as 40,60,80"
         levels = cli.read_numbers(heights, heights.count(",") + 1, wanted)
-        if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= 20_000:
+        if list(levels) != sorted(set(levels)) or not 0 < levels[0] <= levels[-1] <= HIGHEST:
             raise InputError(wanted)
         from faao_mav.radio.terrain import read_terrain, terrain_map
         from faao_mav.report.link import over_terrain

@@ -87,7 +87,10 @@ class Site:
     wind: Wind = Wind(speed=0.0, from_degrees=0.0)
 
 
-_Height: TypeAlias = Annotated[Number, Field(ge=1, le=20000)]
+HIGHEST = 20_000.0
+"""The greatest height, m, that is planned for, or mapped: no vehicle here flies as high. Chosen."""
+
+_Height: TypeAlias = Annotated[Number, Field(ge=1, le=HIGHEST)]
 
 
 class Heights(NamedTuple):

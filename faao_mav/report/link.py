@@ -60,12 +60,13 @@ def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = Non
             told += f"{_extent(above)} of the station's antenna"
         lines.append(("map", told))
     level = f"reference_gain_db: {fit.reference_gain_db:.2f}\n" if absolute else ""
-    terms = ", ".join(f"{term:.2f}" for term in fit.elevation_db)
+    terms, spread = ", ".join(f"{term:.2f}" for term in fit.elevation_db), f"{fit.spread_db:.2f}"
+    spread = "0.01" if spread == "0.00" else spread  # a plan takes what is above 0
     (least, most), (near, far) = fit.elevation_deg, fit.distance_m
     law = (
         f"# {fit}: d the distance, m, s the sine of the elevation\nabout: {json.dumps(rests_on)}\n"
         f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
-        f"spread_db: {max(fit.spread_db, 0.01):.2f}\ncorrelation_m: {fit.correlation_m:.0f}\n"
+        f"spread_db: {spread}\ncorrelation_m: {fit.correlation_m:.0f}\n"
         f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
     )
     return LinkReport(lines, record, law, above)

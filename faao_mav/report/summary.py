@@ -127,7 +127,7 @@ def _headline(result: Result) -> str:
     if result.no_mission is not None:
         return f"{told}; there is no mission for it"
     if result.prediction is None:
-        return told
+        return f"{told}; {_wrong(result)}" if result.findings else told
     share = result.prediction.delivered_rate / rate if rate else 1.0
     return f"{told}; the mission keeps {100 * share:.2f} % of it; {_wrong(result)}"
 
