@@ -1,5 +1,6 @@
 """What all tests share."""
 
+import gc
 import os
 import socket
 from collections.abc import Callable
@@ -190,3 +191,7 @@ def autopilots(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if named is None:
         pytest.skip("FAAO_AUTOPILOTS does not name a folder with the real autopilots")
     return usable(Path(named), tmp_path_factory.mktemp("autopilots"))
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()  # nothing of what is imported is garbage

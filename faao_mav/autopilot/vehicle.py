@@ -127,13 +127,15 @@ class Vehicle:
 
     def usable(self) -> "Vehicle":
         """Return the vehicle without the parameters that are no use: those have their defaults."""
-        table = self.type.parameters.values()
-        kept = {
-            name: number
-            for name, number in self.parameters.items()
-            if all(each.is_usable(number, name) for each in table if name in each.names)
+        given = self.parameters
+        useless = {
+            name
+            for each in self.type.parameters.values()
+            for name in each.names
+            if name in given and not each.is_usable(given[name], name)
         }
-        return replace(self, parameters=kept) if len(kept) < len(self.parameters) else self
+        kept = {name: number for name, number in given.items() if name not in useless}
+        return replace(self, parameters=kept) if useless else self
 
     def climb_time(self, height: float, *, take_off: bool = False) -> float:
         """Return how long a climb of `height`, m, takes from rest to rest, s; or a take-off."""

@@ -111,7 +111,8 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         found = re.search(r"http://\S+", process.stderr.readline())
         assert found is not None
         with playwright.sync_playwright() as driver:
-            browser = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+            plainly = ["--no-sandbox", "--disable-gpu"]
+            browser = driver.chromium.launch(executable_path=CHROMIUM, args=plainly)
             yield (here := Served(plan, found[0], browser.new_context()))
             plan.write_text(PLAN)
             with vehicle(faults=Faults(loss=0.2, rate=300)) as (connection, _):

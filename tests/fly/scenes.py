@@ -86,9 +86,19 @@ def away(metres: float, higher: float = 0.0) -> Home:
     return Home(float(latitude), float(longitude), HOME.altitude + higher)
 
 
+FORESEEN: dict[str, Track] = {}
+
+
+def foreseen(mission: Mission, vehicle: Vehicle, **how: Any) -> Track:
+    """Return the predicted flight, which many scenes have in common."""
+    key = repr((mission, vehicle, how))
+    FORESEEN[key] = FORESEEN.get(key) or predict(mission, vehicle, **how)
+    return FORESEEN[key]
+
+
 def fly(mission: Mission, _: Vehicle) -> Track:
     """Return the flight of an ArduCopter, four times as fast."""
-    track = predict(mission, Vehicle())
+    track = foreseen(mission, Vehicle())
     return replace(track, t=track.t / 4, velocity=4 * track.velocity, reached=track.reached / 4)
 
 

@@ -28,12 +28,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import DATA, MODES, ORDERS, Scene, arms, is_setpoint, staged, starts
+from scenes import DATA, MODES, ORDERS, Scene, arms, foreseen, is_setpoint, staged, starts
 from stations import VEHICLE
 from trials import flown
 
 from faao_mav.wire.messages import CommandLong, MissionAck
 from faao_mav.wire.protocol import MavCommand, MavResult
+
+
+@pytest.fixture(autouse=True)
+def foreseen_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("faao_mav.autopilot.predict.predict", foreseen)
 
 
 def rows() -> Iterator[Any]:

@@ -24,13 +24,8 @@ pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
 
 
 @pytest.fixture(scope="module")
-def all_targets(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Target]:
-    return targets(tmp_path_factory.mktemp("fuzz")) | wire_targets()
-
-
-@pytest.fixture
-def found(all_targets: dict[str, Target]) -> Iterator[dict[str, Target]]:
-    yield all_targets
+def found(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Target]]:
+    yield targets(tmp_path_factory.mktemp("fuzz")) | wire_targets()
     gc.collect()
 
 
