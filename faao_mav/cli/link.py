@@ -5,7 +5,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -37,67 +37,47 @@ class _Measured:
 
     def gains(self, path: Path, station: Sequence[float]) -> "Iterator[Samples]":
         """Yield the gain, dB, in each flight of a table or log; without power within a constant."""
-        for found in self._flights(path, station):
-            if found.unit == "mbit/s":
-                found = self._by_rates(path, found)
-            over_noise = found.unit == "db"
-            if over_noise and (self.power is None) != (self.noise is None):
-                raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
-            floor = (self.noise or 0.0) * over_noise
-            yield replace(found, level=found.level + floor - (self.power or 0.0))
-
-    def _flights(self, path: Path, station: Sequence[float]) -> "Iterator[Samples]":
-        """Yield what was measured in the flights of a table or log."""
         import numpy as np
 
         from faao_mav.fly.logs import read_log
-        from faao_mav.radio.measured import measured_in, read_measured
+        from faao_mav.plan.reader import MAX_BESIDE, RATES, read_rates
+        from faao_mav.radio.measured import read_measured
+        from faao_mav.radio.rate_steps import RateSteps
 
         units = dict(each.partition("=")[::2] for each in self.unit or ())
-        if lacking := [column for column, unit in units.items() if not unit]:
-            raise InputError(f"--unit {lacking[0]}=: expected COLUMN=UNIT, as in rssi=dbm")
         points = [
             cli.read_numbers(each, 2, f"--calibrate {each}: expected COUNT=DBM, two numbers", "=")
             for each in self.calibrate or ()
         ]
         if len(points) > 2 or len({count for count, *_ in points}) < len(points):
             raise InputError("--calibrate: expected one or two different counts")
-        if path.suffix.lower() not in (".bin", ".tlog", ".ulg"):
-            found = read_measured(path, station, units, points)
-            if found.left_out:
-                cli.note(f"{path}: {found.left_out} rows without a number are left out")
-            yield found
-            return
-        told = [record for record in read_log(path) if np.isfinite(record.rssi).any()]
-        if not told:
+        steps = None
+        if self.rates is not None:
+            text = read_text(self.rates, MAX_BESIDE, "a table", InputError)
+            steps = RateSteps.of(*read_rates(text, str(self.rates), RATES[:1]).values())
+        tables: list[list[Any]] = [[]]
+        if path.suffix.lower() in (".bin", ".tlog", ".ulg"):
+            header = ["time_s", "latitude", "longitude", "altitude_m", "rssi"]
+            units.setdefault("rssi", "raw")
+            tables = [
+                [
+                    header,
+                    *zip(f.t, f.latitude, f.longitude, f.altitude - f.home, f.rssi, strict=True),
+                ]
+                for f in read_log(path)
+                if np.isfinite(f.rssi).any()
+            ]
+        if not tables:
             raise InputError(f"{path}: no radio tells a level in it; expected RADIO_STATUS or RAD")
-        level = f"rssi_{units.get('rssi', 'raw')}"
-        header = ["time_s", "latitude", "longitude", "altitude_m", level]
-        for each in told:
-            up = each.altitude - each.home
-            rows = np.column_stack([each.t, each.latitude, each.longitude, up, each.rssi])
-            yield measured_in(path, header, rows.tolist(), station, {}, points)
-
-    def _by_rates(self, path: Path, found: "Samples") -> "Samples":
-        """Return a throughput, Mbit/s, as the SNR, dB, at which the radio has that rate.
-
-        What is below the lowest rate or not below the highest may be of any SNR, and is left out.
-        """
-        import numpy as np
-
-        from faao_mav.plan.reader import MAX_BESIDE, RATES, read_rates
-        from faao_mav.radio.rate_steps import RateSteps
-
-        if self.rates is None:
-            raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
-        text = read_text(self.rates, MAX_BESIDE, "a table", InputError)
-        steps = RateSteps.of(*read_rates(text, str(self.rates), RATES[:1]).values())
-        told = np.where(found.level < steps.most, found.level, np.nan)
-        snr = np.interp(told, steps.rates, steps.snr_db, left=np.nan)
-        if lost := np.count_nonzero(np.isnan(snr)):
-            said = "rows at the least or the greatest rate tell no SNR and are left out"
-            cli.note(f"{path}: {lost} {said}")
-        return replace(found, level=snr, unit="db")
+        for rows in tables:
+            found = read_measured(path, station, units, points, steps, rows)
+            if found.left_out and not rows:
+                cli.note(f"{path}: {found.left_out} rows tell no level and are left out")
+            over_noise = found.unit == "db"
+            if over_noise and (self.power is None) != (self.noise is None):
+                raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
+            floor = (self.noise or 0.0) * over_noise
+            yield replace(found, level=found.level + floor - (self.power or 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +203,8 @@ def link(
     if out is not None and (law := found.law):
         if found.above is not None and map_file is not None:
             contents[map_file] = map_archive(found.above)
-            law += f"map: {json.dumps(os.path.relpath(map_file, out.parent))}\n"
-        contents[out] = law.encode()
+            law["map"] = os.path.relpath(map_file, out.parent)
+        contents[out] = "".join(f"{key}: {json.dumps(law[key])}\n" for key in law).encode()
     write_together(contents)
     written = [*reversed(contents)]
     cli.show(

@@ -22,6 +22,7 @@ from faao_mav.arrays import Real
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import RateField
 from faao_mav.optimizer.solution import Solution
+from faao_mav.radio.gain_map import Grid
 from faao_mav.radio.spline import Spline
 
 SHADOWINGS = 400
@@ -61,18 +62,17 @@ def shadows(problem: Problem, w: Real, count: int = SHADOWINGS) -> Iterator[Real
     Of a station that moves the field is over its places too. A wave number with the spectrum of
     exp(-r / D) is a Gaussian over the size of another.
     """
-    radio, fields = problem.plan.radio, []
-    rng = np.random.default_rng([radio.seed, 2])
-    for link, law, spread in zip(problem.links, radio.gain_laws, radio.spreads, strict=True):
-        p = link.gains.station
-        places = np.hstack([w, p]) if p.ndim > 1 else w
-        fields.append((places, law.correlation_m, spread * np.sqrt(2 / _WAVES)))
+    radio, rng = problem.plan.radio, np.random.default_rng([problem.plan.radio.seed, 2])
+    hops = [*zip(problem.links, radio.gain_laws, radio.spreads, strict=True)]
     for _ in range(count):
         found = []
-        for places, D, height in fields:
-            size = np.abs(rng.standard_normal((_WAVES, 1))) * D
+        for link, law, spread in hops:
+            p = link.gains.station
+            places = np.hstack([w, p]) if p.ndim > 1 else w
+            size = np.abs(rng.standard_normal((_WAVES, 1))) * law.correlation_m
             waves = rng.standard_normal((_WAVES, places.shape[1])) / size
             phases = rng.uniform(0, 2 * np.pi, (_WAVES, 1))
+            height = spread * np.sqrt(2 / _WAVES)
             found.append(height * np.cos(waves @ places.T + phases).sum(axis=0))
         yield np.array(found)
 
@@ -83,15 +83,15 @@ def outcomes(problem: Problem, w: Real, rates: Rates, count: int = SHADOWINGS) -
     Bits per slot and hertz (count, n), each the sum of what was before; see `arriving`.
     """
     most = _REACH * max(problem.plan.radio.spreads)
-    table, now = np.array([rates(db) for db in np.linspace(-most, most, _OFFSETS)]), rates(0.0)
+    db, slots, now = np.linspace(-most, most, _OFFSETS), np.arange(float(len(w))), rates(0.0)
     shares = problem.relay.best_shares(now[0], now[1], problem.kinematics.time_step)
-    (hop, slot), found = np.ogrid[:2, : len(w)], []
-    for shadow in shadows(problem, w, count):
-        place = np.clip((shadow / most + 1) / 2, 0, 1) * (_OFFSETS - 1)
-        below = np.minimum(place.astype(np.intp), _OFFSETS - 2)
-        low, high = table[below, hop, slot], table[below + 1, hop, slot]
-        found.append(arriving(problem, low + (place - below) * (high - low), shares))
-    return np.array(found)
+    hops = [Grid.through(db, slots, each) for each in np.stack([*map(rates, db)], axis=1)]
+
+    def arrived(shadow: Real) -> Real:
+        under = [hop.value(each, slots) for hop, each in zip(hops, shadow, strict=True)]
+        return arriving(problem, np.array(under), shares)
+
+    return np.array([*map(arrived, shadows(problem, w, count))])
 
 
 def arriving(problem: Problem, rates: Real, shares: Real | None = None) -> Real:

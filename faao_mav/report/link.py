@@ -1,8 +1,6 @@
 """A link that was measured in flight: the fitted law, in lines, as a file and as a page."""
 
-import json
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -19,18 +17,23 @@ _SHOWN = 20.0  # dB left at which the map's colours end: thrice what shadowing l
 _LEVELS = 16  # colours on that map's scale. Chosen: their steps can hardly be seen
 _MOST_SHOWN = 2000  # means that the page shows at most: a page of a megabyte. Chosen
 
+_LAW = {
+    "reference_gain_db": 2, "exponent": 3, "elevation_db": 2, "spread_db": 2, "correlation_m": 0,
+    "elevation_deg": 1, "distance_m": 2,
+}  # what a plan's `gain` takes of a fit, and its decimals  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True)
 class LinkReport:
     """What is known of a link: `lines` for people, and the `record` of `--json`.
 
-    `law` is the file that a plan's `gain` names, nothing where no law holds; `above` is the map
+    `law` is what a plan has as its `gain`, by key, nothing where no law holds; `above` is the map
     that the law is to name, where there is one.
     """
 
     lines: list[Line]
     record: dict[str, Any]
-    law: str
+    law: dict[str, Any]
     above: GainMap | None = None
 
 
@@ -41,59 +44,48 @@ def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = Non
     one leg tells none.
     """
     rests_on = f"{counted(fit.means, 'mean')} of {fit.flown.source}"
-    lines = list(_fitted_lines(fit, absolute, rests_on))
     record = {each.name: getattr(fit, each.name) for each in fields(fit)}
     del record["flown"], record["leg"]
     record["holds"] = fit.holds
     if not absolute:
         record["reference_gain_db"] = None
+    (near, far), (least, most) = fit.distance_m, fit.elevation_deg
+    ranges = f"{near:.0f} to {far:.0f} m away, {least:.0f} to {most:.0f} degrees high"
+    lines = [("gain", str(fit)), ("measured", f"{ranges}; {rests_on}")]
+    if not absolute:
+        told = "shape only: the plan's radio.reference_gain_db stands; give --power for the level"
+        lines[:1] = [("gain", f"{fit}, within a constant"), ("", told)]
+    if fit.legs == 1:
+        told = "one leg alone: d^-2 with its level, nothing that could be told from it"
+        lines.append(("", told))
+    else:
+        heights = f" and {fit.heights} heights" if fit.heights > 1 else ""
+        told = f"{fit.spread_db:.1f} dB at {counted(fit.legs, 'leg')}{heights} left out one by one "
+        told += f"(d^-2: {fit.paper_spread_db:.1f}), correlated over {fit.correlation_m:.0f} m"
+        error = f"{fit.gain_error_db:.1f} dB of the gain where it was flown, one standard error"
+        lines += [("spread", told), ("error", error)]
     if not fit.holds:
-        return LinkReport(lines, record, "")
-    above = None
+        told = f"of distance and elevation holds: {fit.spread_db:.1f} dB are left, more than "
+        told += f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
+        lines.append(("no law", f"{told}stands about it, or fly higher"))
+        return LinkReport(lines, record, {})
+    above, spread = None, fit.spread_db
     if station is not None:
         above, alone, left = kriged(fit, station)
         record |= {"left_out_db": alone, "left_out_map_db": left}
         told = f"none: no map tells legs that are left out better than the law, {alone:.1f} dB"
         if above is not None:
-            fit = replace(fit, spread_db=left)
+            spread = left
             told = f"{left:.1f} dB at legs left out one by one, {alone:.1f} by the law alone; "
             told += f"{_extent(above)} of the station's antenna"
         lines.append(("map", told))
-    level = f"reference_gain_db: {fit.reference_gain_db:.2f}\n" if absolute else ""
-    terms, spread = ", ".join(f"{term:.2f}" for term in fit.elevation_db), f"{fit.spread_db:.2f}"
-    spread = "0.01" if spread == "0.00" else spread  # a plan takes what is above 0
-    (least, most), (near, far) = fit.elevation_deg, fit.distance_m
-    law = (
-        f"# {fit}: d the distance, m, s the sine of the elevation\nabout: {json.dumps(rests_on)}\n"
-        f"{level}exponent: {fit.exponent:.3f}\nelevation_db: [{terms}]\n"
-        f"spread_db: {spread}\ncorrelation_m: {fit.correlation_m:.0f}\n"
-        f"elevation_deg: [{least:.1f}, {most:.1f}]\ndistance_m: [{near:.5g}, {far:.5g}]\n"
-    )
+    law = {"about": f"{fit}: {rests_on}"} | {
+        key: np.round(record[key], decimals).tolist()
+        for key, decimals in _LAW.items()
+        if record[key] is not None
+    }
+    law["spread_db"] = max(0.01, round(spread, 2))  # a plan takes what is above 0
     return LinkReport(lines, record, law, above)
-
-
-def _fitted_lines(fit: LinkFit, absolute: bool, rests_on: str) -> Iterator[Line]:
-    """Yield the law, what it rests on, and what is known of its errors."""
-    yield "gain", str(fit) if absolute else f"{fit}, within a constant"
-    if not absolute:
-        told = "shape only: the plan's radio.reference_gain_db stands; give --power for the level"
-        yield "", told
-    (near, far), (least, most) = fit.distance_m, fit.elevation_deg
-    ranges = f"{near:.0f} to {far:.0f} m away, {least:.0f} to {most:.0f} degrees high"
-    yield "measured", f"{ranges}; {rests_on}"
-    if fit.legs == 1:
-        yield "", "one leg alone: d^-2 with its level, nothing that could be told from it"
-    else:
-        heights = f" and {fit.heights} heights" if fit.heights > 1 else ""
-        told = f"{fit.spread_db:.1f} dB at {counted(fit.legs, 'leg')}{heights} left out one by one "
-        told += f"(d^-2: {fit.paper_spread_db:.1f}), correlated over {fit.correlation_m:.0f} m"
-        yield "spread", told
-        told = f"{fit.gain_error_db:.1f} dB of the gain where it was flown, one standard error"
-        yield "error", told
-    if not fit.holds:
-        told = f"of distance and elevation holds: {fit.spread_db:.1f} dB are left, more than "
-        told += f"{SPREAD_OF_NO_LAW:g}. Nothing is promised; raise the station's antenna over what "
-        yield "no law", f"{told}stands about it, or fly higher"
 
 
 def over_terrain(found: GainMap, megahertz: float, names: str) -> LinkReport:
@@ -124,7 +116,7 @@ def over_terrain(found: GainMap, megahertz: float, names: str) -> LinkReport:
         told += f"; {each['below_ground']:.0%} is below ground"
         lines.append((f"at {each['height']:g} m", told))
     about = f"free space at {megahertz:g} MHz, diffraction by ITU-R P.526 over {names}"
-    law = f"about: {json.dumps(about)}\nreference_gain_db: {level:.2f}\nexponent: 2\n"
+    law = {"about": about, "reference_gain_db": round(level, 2), "exponent": 2}
     record = {"reference_gain_db": level, "exponent": 2.0, "origin": found.origin}
     return LinkReport(lines, record | {"losses": losses}, law, found)
 

@@ -14,6 +14,7 @@ from faao_mav.errors import InputError
 from faao_mav.radio.fit import LinkFit, Samples, fit_link
 from faao_mav.radio.kriging import kriged
 from faao_mav.radio.measured import read_measured
+from faao_mav.radio.rate_steps import RateSteps
 from faao_mav.radio.spline import Spline
 
 
@@ -190,6 +191,7 @@ def test_of_noise_there_is_no_map() -> None:
 
 
 ANTENNA = (-35.0, 149.0, 10.0)
+RATES = RateSteps((0.0, 5.0, 10.0, 15.0), (1.0, 6.0, 20.0, 30.0))
 
 
 def table(folder: Path, header: str, level: object, separator: str = ",") -> Path:
@@ -208,11 +210,11 @@ def test_headers_tell_what_is_measured(tmp_path: Path) -> None:
         ("time_s,latitude,longitude,altitude_m,rsrp_dbm", -80.5, "dbm", -80.5),
         ("Time [s],Lat (deg),Lon (deg),Alt (m),RSRP [dBm]", -80.5, "dbm", -80.5),
         ("t,lat,lng,height_m,SINR (dB)", 12.0, "db", 12.0),
-        ("timestamp_s,latitude,longitude,altitude_m,throughput_mbit_per_s", 20.0, "mbit/s", 20.0),
-        ("time_s,lat,lon,altitude_m,throughput kbit/s", 500.0, "mbit/s", 0.5),
+        ("timestamp_s,latitude,longitude,altitude_m,throughput_mbit_per_s", 20.0, "db", 10.0),
+        ("time_s,lat,lon,altitude_m,throughput kbit/s", 13000.0, "db", 7.5),
         ("time_s,lat,lon,alt_m,rssi_sik", 133, "dbm", -57.0),
     ):
-        found = read_measured(table(tmp_path, header, level), ANTENNA)
+        found = read_measured(table(tmp_path, header, level), ANTENNA, rates=RATES)
         assert found.unit == unit
         np.testing.assert_allclose(found.level, value)
         np.testing.assert_allclose(found.place[0], [0.0, 110.94, 50.0], atol=0.1)
