@@ -204,11 +204,9 @@ class GainField:
 
     def most_between(self, near: Real, far: Real) -> Real:
         """Return the most of l (...) by the law at distances from `near` to `far` (...), m."""
-        most = np.maximum(self._by_law(near), self._by_law(far))
-        for turn in self.law.turns(float(far.max()), self.height)[1:-1]:
-            inside = (near < turn) & (turn < far)
-            most = np.where(inside, np.maximum(most, self._by_law(turn)), most)
-        return most
+        turns = self.law.turns(float(far.max()), self.height)
+        inside = np.clip(turns.reshape(-1, *[1] * max(near.ndim, far.ndim)), near, far)
+        return np.asarray(self._by_law(inside).max(axis=0))
 
     def _by_law(self, distance: Real) -> Real:
         """Return l (...) by the law at distances on the ground (...), m."""

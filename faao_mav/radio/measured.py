@@ -125,7 +125,7 @@ def _level(
     if unit in _SOUND:
         return told, unit
     if unit not in ("sik", "raw"):
-        if rates is None:
+        if rates is None or not rates.rates:
             raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
         told = np.where(told < rates.most, told, np.nan)
         return np.interp(told, rates.rates, rates.snr_db, left=np.nan), "db"

@@ -157,7 +157,7 @@ def queue_levels(I_U: Sequence[float], I_G: Sequence[float], buffer: float) -> l
         level = sum(worth.bits[at:], 0.0)
         levels.append(level)
         if level >= u:
-            worth.drop(u)
+            worth.drop(u, -1)
             worth.insert(at, slope, u + g)
         else:
             again = worth.after(at, u - level) if g > 0 else []
@@ -166,7 +166,7 @@ def queue_levels(I_U: Sequence[float], I_G: Sequence[float], buffer: float) -> l
             for value, bits in again:
                 worth.insert(len(worth.slopes), 1 - value * u / g, bits * g / u)
         reachable -= u
-        worth.limit(min(buffer, reachable))
+        worth.drop(sum(worth.bits) - min(buffer, reachable), 0)
     return levels[::-1]
 
 
@@ -186,14 +186,14 @@ class _Staircase:
             self.slopes.insert(at, slope)
             self.bits.insert(at, bits)
 
-    def drop(self, bits: float) -> None:
-        """Take away the first `bits`."""
+    def drop(self, bits: float, end: int) -> None:
+        """Take away the first `bits`, at the end -1 of this list, or the last, at its end 0."""
         while bits > 0 and self.bits:
-            if self.bits[-1] > bits:
-                self.bits[-1] -= bits
+            if self.bits[end] > bits:
+                self.bits[end] -= bits
                 return
-            bits -= self.bits.pop()
-            self.slopes.pop()
+            bits -= self.bits.pop(end)
+            self.slopes.pop(end)
 
     def after(self, at: int, bits: float) -> list[tuple[float, float]]:
         """Return the stairs, slope and bits, of the `bits` that come after the stair `at`."""
@@ -203,13 +203,3 @@ class _Staircase:
             found.append((self.slopes[at], min(bits, self.bits[at])))
             bits -= self.bits[at]
         return [*found, (0.0, bits)] if bits > 0 else found
-
-    def limit(self, most: float) -> None:
-        """Take away what comes after `most` bits."""
-        excess, stairs = sum(self.bits) - most, 0
-        while excess > 0 and stairs < len(self.bits) and self.bits[stairs] <= excess:
-            excess -= self.bits[stairs]
-            stairs += 1
-        del self.slopes[:stairs], self.bits[:stairs]
-        if excess > 0 and self.bits:
-            self.bits[0] -= excess
