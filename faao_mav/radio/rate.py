@@ -10,7 +10,6 @@ features, which are the same for all channels. Those of 16- and 64-QAM are summe
 difference.
 """
 
-import math
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
@@ -92,18 +91,10 @@ def cutoff_rate(
     >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
     0.548059
     """
-    shape = np.broadcast_shapes(np.shape(H)[:-2], np.shape(P)[:-2])
-    channels, precoders = (
-        np.broadcast_to(np.asarray(M, dtype=np.complex128), (*(shape or (1,)), *np.shape(M)[-2:]))
-        for M in (H, P)
-    )
-    s = np.empty(math.prod(shape))
-    for first in range(0, len(s), CACHE):
-        part = np.arange(first, min(first + CACHE, len(s)))
-        at = np.unravel_index(part, shape or (1,))
-        s[part] = class_sum(classes).value(_coordinates(channels[at], precoders[at], noise))
+    z = _coordinates(H, P, noise)
+    s = class_sum(classes).value(z.reshape(-1, z.shape[-1]))
     rate: Real = classes.bits - np.logaddexp(0.0, s) / np.log(2.0)
-    return np.maximum(rate, 0.0).reshape(shape)
+    return np.maximum(rate, 0.0).reshape(z.shape[:-1])
 
 
 class ClassSum:
