@@ -95,7 +95,7 @@ class Samples:
         return replace(self, t=t, place=np.stack(place, axis=1), level=10.0 * np.log10(power))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class LinkFit:
     """A law of the path gain with what is known of its errors; see the module for the equation.
 
@@ -111,8 +111,8 @@ class LinkFit:
     >>> t = np.arange(0.0, 200.0)
     >>> place = np.stack([300.0 * np.cos(t / 9), 8.0 * t - 700.0, 40.0 + 0.2 * t], axis=1)
     >>> level = -40.0 - 20.0 * np.log10(np.linalg.norm(place, axis=1))
-    >>> print(fit_link([Samples(t, place, level)], seconds=1.0))
-    -40.0 - 20 log10 d dB
+    >>> fit_link([Samples(t, place, level)], seconds=1.0)
+    <LinkFit: -40.0 - 20 log10 d dB, spread 0.0 dB of 200 means>
     """
 
     reference_gain_db: float
@@ -137,6 +137,10 @@ class LinkFit:
         for power, term in zip(("", "^2", "^3"), self.elevation_db, strict=False):
             text += f" {'-' if term < 0 else '+'} {abs(term):.1f} s{power}"
         return f"{text} dB"
+
+    def __repr__(self) -> str:
+        """Say what was found, in a line."""
+        return f"<LinkFit: {self}, spread {self.spread_db:.1f} dB of {self.means} means>"
 
     @property
     def holds(self) -> bool:
