@@ -8,6 +8,7 @@ from faao_mav.autopilot.dialect import name_of
 from faao_mav.autopilot.px4 import CONDITIONS, FLIES, LEAST_TAKEOFF
 from faao_mav.files import table
 from faao_mav.mission.command import ABOVE_TERRAIN, FLOWN_TO, LANDINGS, TAKEOFFS, Command, Frame
+from faao_mav.mission.item import MissionItem
 from faao_mav.validate.context import HOME, NAV_LAST, Straight, ValidationContext, at_zero
 from faao_mav.validate.rule import Hits, checks, hit, threshold
 
@@ -27,6 +28,17 @@ _RALLY_BIT = 32  # The bit of ARMING_MIS_ITEMS that asks for a rally point.
 _TAKEOFFS = {"copter": TAKEOFFS, "plane": {Command.NAV_TAKEOFF}}
 """What gets the aircraft off the ground. A plane without vertical rotors stays there for the other.
 Measured."""
+
+_LEFT_OUT = {
+    94: "descends until the ground has its load",
+    207: "turns the fence off, or its floor",
+    208: "releases the parachute",
+    42702: "leaves the aircraft to a script",
+    42703: "holds an attitude, whatever way that is",
+}
+_HARMLESS = {207: (1,), 208: (0, 1)}
+"""What commands do that is not predicted, unless param1 is harmless: the fence turned on, the
+parachute made ready or not. Source: ArduPilot 4.7 AC_Fence, AP_Parachute."""
 
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)  # What an approach may start from.
 
@@ -100,6 +112,9 @@ def _alone(context: ValidationContext) -> Hits:
             yield hit("ardupilot-frame-mission", k)
         if command in _SKIPPED.get(context.vehicle.kind, ()):
             yield hit("ardupilot-command-skipped", k)
+        does = _left_out(context, item)
+        if does and command not in _SKIPPED.get(context.vehicle.kind, ()):
+            yield hit("ardupilot-left-out", k, does=does)
         if command in CONDITIONS and in_mission:
             yield hit("px4-command-rejected", k)
         if command in (Command.NAV_VTOL_TAKEOFF, Command.NAV_VTOL_LAND, 3000):
@@ -117,6 +132,18 @@ def _alone(context: ValidationContext) -> Hits:
     for k, kept in changed[:1]:
         more = f", and so in {len(changed)} items" if changed[1:] else ""
         yield hit("altitude-rounded", k, kept=kept, more=more)
+
+
+def _left_out(context: ValidationContext, item: MissionItem) -> str:
+    """Return what ArduPilot does at `item` that is neither predicted nor checked, "" if nothing."""
+    how, frame = item.params[0], context.frame
+    if item.command == Command.NAV_DELAY and not how > 0 and item.params[1:] != (-1, -1, -1):
+        return "waits for a time of the day (UTC)"
+    if item.command == Command.DO_SET_HOME and how != 1 and not at_zero(item) and frame is not None:
+        moved = math.hypot(*frame.to_local(item.x, item.y))
+        return f"moves home by {moved:.0f} m" if moved > threshold.home_moved else ""
+    harmless = how in _HARMLESS.get(item.command, ())
+    return "" if harmless else _LEFT_OUT.get(item.command, "")
 
 
 @checks
