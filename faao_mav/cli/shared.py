@@ -98,7 +98,7 @@ def _link(
     own_system: int | None = option(
         "N", "The system number to speak as; without: 246.", min=1, max=255
     ),
-    log: File = option("F.tlog", "Write a log of the exchange."),
+    log: File = option("F.tlog", "Write a log of the exchange, in place of an older one."),
     wait: float = option(
         "S", "How long to wait for the vehicle, s.", "--timeout", min=0.1, default=10.0
     ),
