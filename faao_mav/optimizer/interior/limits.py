@@ -36,22 +36,24 @@ _SAME = np.eye(2)[:, :, None]
 
 @dataclass(frozen=True)
 class Disc(Constraint):
-    """g(x) = `side` (||x - wind||^2 - `radius`^2) / 2 of a velocity or acceleration x.
+    """g(x) = `side` (||x - center||^2 / `unit`^2 - `radius`^2) / 2 of a place or its derivatives.
 
-    With a `side` of -1 x stays in the disc, with 1 outside.
+    With a `side` of -1 x stays in the disc, with 1 outside. The `center` is (2,), or (2, n) where
+    each slot has its own.
     """
 
     of: tuple[int, ...]  # type: ignore[misc]
     radius: float = 1.0
-    wind: Vector = (0.0, 0.0)
+    center: Vector | Real = (0.0, 0.0)
     side: float = -1.0
+    unit: float = 1.0
 
     def rows(self, x: Real) -> Rows:
         """Return g."""
-        away = x - np.reshape(self.wind, (2, 1))
+        away = (x - np.reshape(self.center, (2, -1))) / self.unit
         value = self.side * ((away * away).sum(axis=0) - self.radius**2) / 2
-        bend = np.broadcast_to(self.side * _SAME, (2, 2, x.shape[1]))
-        return Rows(value[None], self.side * away[None], bend[None])
+        bend = np.broadcast_to(self.side / self.unit**2 * _SAME, (1, 2, 2, x.shape[1]))
+        return Rows(value[None], self.side / self.unit * away[None], bend)
 
 
 def _by_slot(gain: float, value: Real, slope: Real, bend: Real) -> Rows:

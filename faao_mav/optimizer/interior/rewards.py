@@ -8,7 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import PACKED, Flags, Real
 from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, Rows, W
-from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+from faao_mav.optimizer.kinematics import LENGTH
 from faao_mav.radio.relay import RelayQueue, best_shares, forward_greedily
 
 _FLAT = 1e-9
@@ -146,7 +146,3 @@ class Goal(Constraint):
         if math.isfinite(self.buffer):
             on[3, 0] = False
         return on
-
-    def excess(self, kin: Kinematics, flight: Trajectory) -> float:  # noqa: ARG002
-        """Return 0: every flight has its rewards."""
-        return 0.0

@@ -8,14 +8,15 @@ is always the map as it is.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.interior.constraint import ALLOWED, Constraint, Rows, W, every_excess
+from faao_mav.optimizer.interior.constraint import ALLOWED, W, every_excess
+from faao_mav.optimizer.interior.limits import Disc
 from faao_mav.optimizer.interior.maximize import (
     LocalOptimum,
     constraints_of,
@@ -60,22 +61,6 @@ ROUGHLY = _NARROWING[1:2]
 _AGAIN, _MOST = 5e-3, 20
 """The gain, in shares of what there is, above which a search is made again from where it ended, and
 how often at most: a flight that stops at bends has to move farther than a tube is wide. Chosen."""
-
-
-@dataclass(frozen=True)
-class Tube(Constraint):
-    """g(w) = (1 - ||w - center||^2 / radius^2) / 2: near a flight at `center` (2, n), scaled."""
-
-    center: Real
-    radius: float
-    of = W
-
-    def rows(self, x: Real) -> Rows:
-        """Return g."""
-        away = (x - self.center) / self.radius
-        bend = np.broadcast_to(-np.eye(2)[None, :, :, None], (1, 2, 2, x.shape[1]))
-        value = (1 - (away * away).sum(axis=0)) / 2
-        return Rows(value[None], -away[None] / self.radius, bend / self.radius**2)
 
 
 def starts_over_map(problem: Problem, field: RateField) -> dict[str, Trajectory]:
@@ -220,7 +205,7 @@ def improved_over_map(
                 constraints=(
                     *problem.fenced(kin, (now.w, radius * side)),
                     *([] if energy is None else [energy]),
-                    Tube(now.w.T / LENGTH, radius * side / LENGTH),
+                    Disc(W, 1.0, now.w.T / LENGTH, unit=radius * side / LENGTH),
                 ),
                 tolerance=problem.plan.optimizer.tolerance,
                 max_iterations=iterations,
