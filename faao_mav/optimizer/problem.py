@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from faao_mav.optimizer.design import Link, OwnPrecoder
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
 from faao_mav.optimizer.interior.constraint import Constraint
 from faao_mav.optimizer.interior.limits import EnergyLimit, fence_constraints
+from faao_mav.optimizer.interior.maximize import LocalOptimum, constraints_of, maximize, objective
+from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory, kinematics
 from faao_mav.plan import Plan
 from faao_mav.plan.station import Station
@@ -23,10 +25,6 @@ from faao_mav.radio.constellation import constellation, difference_vector_count
 from faao_mav.radio.gain import GainField, GainFunction
 from faao_mav.radio.rate_steps import StreamRate
 from faao_mav.radio.relay import RelayQueue
-
-if TYPE_CHECKING:
-    from faao_mav.optimizer.interior.maximize import LocalOptimum
-    from faao_mav.optimizer.interior.rewards import Stage
 
 MAX_INPUTS = 4096
 """The most vectors of symbols that a station may send: 64-QAM on two antennas, QPSK on six.
@@ -86,8 +84,6 @@ class Problem:
 
         In half duplex with these `shares` (n,), or the best ones.
         """
-        from faao_mav.optimizer.interior.maximize import objective
-
         return objective(rates, self.kinematics, self.maximised_queue, shares)
 
     def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
@@ -97,8 +93,6 @@ class Problem:
 
     def limits(self, kin: Kinematics) -> tuple[Constraint, ...]:
         """Return all that flights of `kin` have to keep."""
-        from faao_mav.optimizer.interior.maximize import constraints_of
-
         return (*constraints_of(kin), *self.constraints(kin))
 
     def fenced(
@@ -134,17 +128,15 @@ class Problem:
 
     def improved(
         self,
-        stage: "Stage",
+        stage: Stage,
         start: Trajectory,
         tolerance: float,
         steps: int,
         *,
         kin: Kinematics | None = None,
         warm: bool = False,
-    ) -> "LocalOptimum":
+    ) -> LocalOptimum:
         """Return the local optimum near `start`, a flight of `kin`, by `stage`: see `maximize`."""
-        from faao_mav.optimizer.interior.maximize import maximize  # pages do without SciPy
-
         kin = kin or self.kinematics
         return maximize(
             kin,

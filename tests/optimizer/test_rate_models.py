@@ -36,8 +36,8 @@ def places(link: Link, seed: int = 3) -> Real:
 
 
 def derivatives(link: Link, rate: RateModel, w: Real) -> tuple[Real, Real]:
-    gradient, hessian = by_position(link, w.T, rate.partials(*link_coordinates(link, w.T)))
-    return gradient.T, hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
+    at = by_position(link, w.T, rate.partials(*link_coordinates(link, w.T)))
+    return at.gradient.T, at.hessian[[0, 1, 1, 2]].T.reshape(-1, 2, 2)
 
 
 def value_of(link: Link, rate: RateModel) -> Callable[[Real], Real]:

@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import lapack
 
 from faao_mav.arrays import Flags, Real
 from faao_mav.optimizer.interior.constraint import COMMON, Constraint, Grid, Rows, V, W
@@ -82,6 +81,8 @@ class Chain:
 
         With a large multiple of A^T A added it is so for every x, which Cholesky's factors tell.
         """
+        from scipy.linalg import lapack  # with a search, not before: pages do without SciPy
+
         cells, k = self._square.copy(), len(H)
         masked = self._masked(H)
         for column in range(k):
@@ -94,6 +95,8 @@ class Chain:
 
         Raises `numpy.linalg.LinAlgError` where it is singular.
         """
+        from scipy.linalg import lapack
+
         cells, band = self._template.copy(), self._band
         columns, masked = cells.reshape(-1, self.size, cells.shape[1]), self._masked(H)
         for c in range(len(H)):

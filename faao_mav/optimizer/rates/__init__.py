@@ -17,28 +17,13 @@ differences. What counts as the rate (cutoff rate, mutual information) is ``radi
 inputs and how precoders follow a channel are ``optimizer.design``.
 """
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from faao_mav.arrays import Complex, Real, products
 from faao_mav.optimizer.design import Link
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RatePartials:
-    """The rate R of every slot with R_l and R_ll, bits (..., n).
-
-    `by_u`, `by_lu` and `by_uu` are R_u, R_lu and R_uu of a rate that depends on u, else None.
-    """
-
-    value: Real
-    by_l: Real
-    by_ll: Real
-    by_u: Real | None = None
-    by_lu: Real | None = None
-    by_uu: Real | None = None
+from faao_mav.optimizer.interior.rewards import StageValues
 
 
 class RateModel(Protocol):
@@ -47,8 +32,11 @@ class RateModel(Protocol):
     def value(self, gain_log: Real, cosine: Real) -> Real:
         """Return the rate R of every slot, bits (..., n)."""
 
-    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives, bits (..., n)."""
+    def partials(self, gain_log: Real, cosine: Real) -> StageValues:
+        """Return the rate R, bits (..., n), with R_l, R_u (2, ..., n) and R_ll, R_lu, R_uu.
+
+        Of a rate that does not depend on u it is R_l and R_ll alone, (1, ..., n).
+        """
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex | None:
         """Return precoders ((S,) n, N_t, N_t) close to the best at l and u (n,), if known."""
@@ -60,21 +48,23 @@ def link_coordinates(link: Link, w: Real) -> tuple[Real, Real]:
     return link.gains.log(w), away[0] / np.sqrt(link.gains.squared_distance(away))
 
 
-def by_position(link: Link, w: Real, rate: RatePartials) -> tuple[Real, Real]:
-    """Return gradient and Hessian of a `rate` of `link` by the positions w (2, ..., n).
+def by_position(link: Link, w: Real, rate: StageValues) -> StageValues:
+    """Return a `rate` by l and u of `link` as one by the positions w (2, ..., n).
 
-    That is R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per m².
+    That is with R_x, R_y (2, ..., n), bits per metre, and R_xx, R_xy, R_yy (3, ..., n), bits per
+    m².
     """
-    l_i, l_ij = link.gains.slopes(w)
-    gradient = rate.by_l * l_i
-    hessian = rate.by_l * l_ij + rate.by_ll * products(l_i, l_i)
-    if rate.by_u is not None and rate.by_lu is not None and rate.by_uu is not None:
+    (l_i, l_ij), by_l = link.gains.slopes(w), rate.gradient[0]
+    gradient = by_l * l_i
+    hessian = by_l * l_ij + rate.hessian[0] * products(l_i, l_i)
+    if len(rate.gradient) > 1:
         x, y = away = link.gains.away(w)
         r = 1 / np.sqrt(link.gains.squared_distance(away))
         r3, r5 = r**3, 3 * r**5
         u_i = np.stack([r - x * x * r3, -x * y * r3])
         u_xx, u_xy, u_yy = x * (x * x * r5 - 3 * r3), y * (x * x * r5 - r3), x * (y * y * r5 - r3)
-        gradient += rate.by_u * u_i
-        hessian += rate.by_u * np.stack([u_xx, u_xy, u_yy]) + rate.by_uu * products(u_i, u_i)
-        hessian += 2 * rate.by_lu * products(l_i, u_i)
-    return gradient, hessian
+        by_u, (_, by_lu, by_uu) = rate.gradient[1], rate.hessian
+        gradient += by_u * u_i
+        hessian += by_u * np.stack([u_xx, u_xy, u_yy]) + by_uu * products(u_i, u_i)
+        hessian += 2 * by_lu * products(l_i, u_i)
+    return StageValues(rate.value, gradient, hessian)

@@ -8,7 +8,7 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Design, Link
 from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.problem import Problem
-from faao_mav.optimizer.rates import RateModel, RatePartials, by_position, link_coordinates
+from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
 from faao_mav.optimizer.rates.table_rate import STEP, kind_of, table_rates
 from faao_mav.radio.gain import PER_DB
 from faao_mav.radio.rate_steps import RateSteps
@@ -32,8 +32,8 @@ class SlotRate:
         H = self._channel(gain_log, cosine)
         return self.design.rate(self.link, H, self._precoders(H))
 
-    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives by l and u, bits (..., n)."""
+    def partials(self, gain_log: Real, cosine: Real) -> StageValues:
+        """Return the rate and its derivatives by l and u: see `RateModel`."""
         rate, h = self.value, STEP
         if self.design.optimal:
             P = self.initial_precoders(gain_log, cosine)
@@ -49,11 +49,11 @@ class SlotRate:
         middle, up, down = at(0, 0), at(1, 0), at(-1, 0)
         by_l, by_ll = (up - down) / (2 * h), (up - 2 * middle + down) / h**2
         if not self.link.follows_position:
-            return RatePartials(middle, by_l, by_ll)
+            return StageValues(middle, by_l[None], by_ll[None])
         right, left = at(0, 1), at(0, -1)
         by_lu = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * h**2)
         by_u, by_uu = (right - left) / (2 * h), (right - 2 * middle + left) / h**2
-        return RatePartials(middle, by_l, by_ll, by_u, by_lu, by_uu)
+        return StageValues(middle, np.stack([by_l, by_u]), np.stack([by_ll, by_lu, by_uu]))
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:
         """Return the precoders (..., n, N_t, N_t) at l and u (..., n)."""
@@ -93,13 +93,15 @@ class RateField:
 
     def __call__(self, w: Real) -> StageValues:
         """Return rates, gradients and Hessians at positions w (2, ..., n), as `Stage` has them."""
-        shape = (len(self.links), *w.shape[1:])
-        value, gradient, hessian = np.empty(shape), np.empty((2, *shape)), np.empty((3, *shape))
-        for j, (link, rate) in enumerate(zip(self.links, self.rates, strict=True)):
-            partials = rate.partials(*link_coordinates(link, w))
-            value[j] = partials.value
-            gradient[:, j], hessian[:, j] = by_position(link, w, partials)
-        return StageValues(value, gradient, hessian)
+        found = [
+            by_position(link, w, rate.partials(*link_coordinates(link, w)))
+            for link, rate in zip(self.links, self.rates, strict=True)
+        ]
+        return StageValues(
+            np.stack([each.value for each in found]),
+            np.stack([each.gradient for each in found], axis=1),
+            np.stack([each.hessian for each in found], axis=1),
+        )
 
     def smoothed(self) -> "RateField":
         """Return the rates over maps that are smooth: see `Grid.smoothed`."""

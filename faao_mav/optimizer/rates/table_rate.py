@@ -21,7 +21,7 @@ import numpy as np
 
 from faao_mav.arrays import Complex, Flags, Integers, Real
 from faao_mav.optimizer.design import Design, Link
-from faao_mav.optimizer.rates import RatePartials
+from faao_mav.optimizer.interior.rewards import StageValues
 from faao_mav.radio.gain import PER_DB
 from faao_mav.radio.spline import Spline
 
@@ -81,12 +81,12 @@ class TableRate:
         shift, y = _shifted(self.link, self.kind, cosine)
         return np.maximum(0.0, self.table.spline.value(gain_log + shift, y))
 
-    def partials(self, gain_log: Real, cosine: Real) -> RatePartials:
-        """Return the rate and its derivatives by l and u, bits (..., n)."""
+    def partials(self, gain_log: Real, cosine: Real) -> StageValues:
+        """Return the rate and its derivatives by l and u: see `RateModel`."""
         here = _shifted(self.link, self.kind, cosine)
         if self.kind == "curve" or not self.link.follows_position:
             value, by_l, by_ll = self.table.spline.by_x(gain_log + here[0], here[1])
-            return RatePartials(np.maximum(0.0, value), by_l, by_ll)
+            return StageValues(np.maximum(0.0, value), by_l[None], by_ll[None])
         up, down = (_shifted(self.link, self.kind, cosine + h) for h in (STEP, -STEP))
         x_u, y_u = ((a - b) / (2 * STEP) for a, b in zip(up, down, strict=True))
         x_uu, y_uu = ((a - 2 * m + b) / STEP**2 for a, m, b in zip(up, here, down, strict=True))
@@ -94,13 +94,10 @@ class TableRate:
             gain_log + here[0], here[1]
         )
         bent = by_xx * x_u**2 + 2 * by_xy * x_u * y_u + by_yy * y_u**2
-        return RatePartials(
+        return StageValues(
             np.maximum(0.0, value),
-            by_l=by_x,
-            by_ll=by_xx,
-            by_u=by_x * x_u + by_y * y_u,
-            by_lu=by_xx * x_u + by_xy * y_u,
-            by_uu=bent + by_x * x_uu + by_y * y_uu,
+            np.stack([by_x, by_x * x_u + by_y * y_u]),
+            np.stack([by_xx, by_xx * x_u + by_xy * y_u, bent + by_x * x_uu + by_y * y_uu]),
         )
 
     def initial_precoders(self, gain_log: Real, cosine: Real) -> Complex:

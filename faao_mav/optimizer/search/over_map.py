@@ -2,9 +2,9 @@
 
 A map has edges, and what lies behind a ridge is no slope away. What is to be had from an instant
 on, of the queue's level then, is known for each cell by what the cells in reach have of the level
-that is left: the best path by position alone, whatever the map. Made a flight, it is improved in
-a tube about it, on the mean of the rates about each place: over less and less of them. What counts
-is always the map as it is.
+that is left, between two levels in proportion: the best path by position alone, whatever the map.
+Made a flight, it is improved in a tube about it, on the mean of the rates about each place: over
+less and less of them. What counts is always the map as it is.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from faao_mav.arrays import Real
+from faao_mav.arrays import Flags, Real
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.constraint import ALLOWED, W, every_excess
@@ -27,17 +27,13 @@ from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
 from faao_mav.optimizer.search.map_bound import places_about
-from faao_mav.optimizer.search.queue_sweep import QueueSweep
 from faao_mav.optimizer.search.straight import straight_flight, with_stops
-from faao_mav.optimizer.search.sweep import Steps, cells_of, disc
+from faao_mav.optimizer.search.sweep import NOWHERE, Cells, cells_of, largest_ahead
+from faao_mav.radio.relay import RelayQueue
 
 CELLS, _LEVELS, _REACH = (3_000, 5_000), 30, 4.0
 """Cells of the map for each of the paths, levels of the queue, and cells that a step reaches.
 Measured on six sites with ridges: paths over cells of several sizes differ by up to 5 %."""
-
-_FARTHEST = 2 * _REACH
-"""Cells that a step past obstacles reaches at most: cells are larger where slots are long. Chosen:
-each step is looked at by itself, which at 33 cells takes minutes and gigabytes."""
 
 _BETWEEN = 0.4
 """Sides of a cell that a step may be longer than the speed allows: between centres of cells the
@@ -55,12 +51,89 @@ a flight cuts corners of its path by a cell or so, and may not find out of an ob
 _NEAR = 3.0
 """Sides of a cell from a path within which obstacles count for the flight nearest to it. Chosen."""
 
+_SHARES = (0.0, 0.5, 1.0)
+"""Shares of a step in which a half-duplex relay receives. Chosen."""
+
+_LEAST = 1e-9
+"""Bits of the queue's highest level at least: there are levels where nothing is received."""
+
 ROUGHLY = _NARROWING[1:2]
 """The search of them that a rough flight has."""
 
 _AGAIN, _MOST = 5e-3, 20
 """The gain, in shares of what there is, above which a search is made again from where it ended, and
 how often at most: a flight that stops at bends has to move farther than a tube is wide. Chosen."""
+
+
+class QueueSweep:
+    """Best paths by place and level: `rates` (2, K, i, j) of both hops over `cells`, bits.
+
+    They are those of all slots of an instant together; steps from each to the next `reach` so many
+    sides of a cell, over cells `inside` (i, j). There are so many even `levels`, bits per hertz and
+    slot; below 0, for R_avg without a `relay`, more has been sent than was received.
+    """
+
+    def __init__(
+        self,
+        cells: Cells,
+        rates: Real,
+        levels: int,
+        relay: RelayQueue | None,
+        time_step: float,
+        inside: Flags,
+        reach: float,
+    ) -> None:
+        self.cells, self.rates, self.inside, self.reach = cells, rates, inside, reach
+        self.queued, self.half = relay is not None, relay is not None and relay.half
+        come, gone = rates.max(axis=(2, 3)).sum(axis=1)
+        most = come * gone / max(come + gone, _LEAST)  # what is received first and then sent
+        most = max(_LEAST, min(most, np.inf if relay is None else relay.buffer / time_step))
+        self.levels: Real = np.linspace(-most if relay is None else 0.0, most, levels)
+
+    def path(self) -> Real:
+        """Return the best path, the places (K, 2) at the instants, m."""
+        ahead = [each.reshape(len(self.levels), -1) for each in self._backward()][::-1]
+        level = np.zeros(1)
+        places = [int(self._between(ahead[0], level).argmax())]
+        for k, after in enumerate(ahead[1:]):
+            here = places[-1]
+            start = np.arange(self.inside.size).reshape(self.inside.shape) == here
+            near = np.flatnonzero(largest_ahead(1.0 * start, self.inside, self.reach) > 0)
+            rates = self.rates[:, k].reshape(2, -1)[:, here, None]
+            found = [
+                (sent + self._between(after[:, near], left), left)
+                for sent, left in self._after(level, *rates)
+            ]
+            best, level = max(found, key=lambda each: float(each[0].max()))
+            places.append(int(near[best.argmax()]))
+        return np.asarray(self.cells.x.reshape(2, -1)[:, places].T)
+
+    def _backward(self) -> Iterator[Real]:
+        """Yield what can be sent (L, i, j), by the level before, from the last instant back."""
+        shape = len(self.levels), *self.cells.x.shape[1:]
+        after = np.broadcast_to(np.minimum(0.0, self.levels)[:, None, None], shape)
+        for k in range(len(self.cells.instants) - 1, -1, -1):
+            options = self._after(self.levels[:, None, None], *self.rates[:, k])
+            best = np.max([sent + self._between(after, left) for sent, left in options], axis=0)
+            found = np.where(self.cells.alive[k], best, NOWHERE)
+            yield found
+            after = largest_ahead(found, self.inside, self.reach)
+
+    def _after(self, level: Real, I_U: Real, I_G: Real) -> Iterator[tuple[Real, Real]]:
+        """Yield what is sent from a `level` on, and the level that is left."""
+        for share in _SHARES if self.half else (None,):
+            come, gone = (I_U, I_G) if share is None else (share * I_U, (1 - share) * I_G)
+            sent = np.minimum(level + come, gone) if self.queued else gone + 0 * level
+            yield sent, np.clip(level + come - sent, self.levels[0], self.levels[-1])
+
+    def _between(self, values: Real, level: Real) -> Real:
+        """Return the `values` (L, ...) at a `level` (..., or L, ...)."""
+        at = (level - self.levels[0]) / (self.levels[1] - self.levels[0])
+        low = np.minimum(at.astype(np.intp), len(self.levels) - 2)
+        wide = low if low.ndim == values.ndim else low[None]
+        below, above = (np.take_along_axis(values, wide + step, 0) for step in (0, 1))
+        found = below + (at - low) * (above - below)
+        return np.asarray(found if low.ndim == values.ndim else found[0])
 
 
 def starts_over_map(problem: Problem, field: RateField) -> dict[str, Trajectory]:
@@ -147,9 +220,6 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         still = replace(problem, bs_uav=first, uav_user=second)
         field = rate_field(still, design(problem.plan, problem.precoder))
     places = places_about(problem)
-    if problem.free_area is not None:
-        slot = kin.max_speed * kin.time_step / _FARTHEST
-        cells = max(1, round(cells * min(1.0, _side(problem, cells) / slot) ** 2))
     way = float(kin.longest_ways()[0][-1])
     reach = float(np.clip(way / (100 * _side(problem, cells)), _REACH, 2 * _REACH))
     found = cells_of(kin, places, cells, reach, problem.free_area)
@@ -172,9 +242,10 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         found,
         counts[:, None, None] * rates,
         _LEVELS,
-        Steps.over(inside, disc(step + _BETWEEN, 0)),
         relay,
         kin.time_step,
+        inside,
+        step + _BETWEEN,
     )
 
 

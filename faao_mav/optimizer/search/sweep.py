@@ -21,6 +21,9 @@ CORNER = np.sqrt(0.5)
 _THINNEST = 0.02
 """Least width of the map, in its length: stations and ends may lie on one line. Chosen."""
 
+NOWHERE = -1e9
+"""What is to be had where no flight can be: less than any bits."""
+
 MOST_INSTANTS = 100
 """Instants of a flight at most, which limits time and memory. Chosen."""
 
@@ -73,64 +76,19 @@ def largest_near(values: Real, rows: Sequence[tuple[int, int]]) -> Real:
     return best
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Steps:
-    """Steps from cell to cell of a grid (i, j), none of which passes through an obstacle.
+def largest_ahead(values: Real, inside: Flags, reach: float) -> Real:
+    """Return the largest of `values` (..., i, j) that a step from each cell leads to.
 
-    `rows` is what they reach; `near` (M,) are the cells with an obstacle within reach, by their
-    number; `targets` (M, S) the cells that each of them reaches, `passable` which of these steps do
-    not meet one.
+    A step goes `reach` sides over cells that are `inside` (i, j), from each to one of its eight
+    neighbours or of its four: as often as makes an octagon of about the size of the disc. So it
+    leads around obstacles that are thinner than it is long.
     """
-
-    rows: list[tuple[int, int]]
-    near: Integers
-    targets: Integers
-    passable: Flags
-
-    @classmethod
-    def over(cls, inside: Flags, rows: list[tuple[int, int]]) -> "Steps":
-        """Return the steps over cells that are `inside` (i, j), of which none leaves them."""
-        offsets = np.array(
-            [
-                (sign * row, column)
-                for row, columns in rows
-                for sign in ((-1, 1) if row else (1,))
-                for column in range(-columns, columns + 1)
-            ]
-        )
-        margin = int(np.abs(offsets).max())
-        wide = np.pad(inside, margin, constant_values=True)
-        blocked = largest_near((~inside).astype(np.float64), rows) > 0
-        near = np.flatnonzero(blocked & inside)
-        here = np.stack(np.divmod(near, inside.shape[1]), axis=1)[:, None]
-        ends = here + offsets
-        passable = np.all((ends >= 0) & (ends < inside.shape), axis=2)
-        for share in np.arange(1, 2 * margin + 1) / (2 * margin):
-            at = here + np.rint(share * offsets).astype(np.intp) + margin
-            passable &= wide[at[..., 0], at[..., 1]]
-        ends = np.clip(ends, 0, np.array(inside.shape) - 1)
-        return cls(rows, near, ends[..., 0] * inside.shape[1] + ends[..., 1], passable)
-
-    def best(self, values: Real) -> Real:
-        """Return the largest of `values` (..., i, j) that a step from each cell leads to."""
-        found = largest_near(values, self.rows)
-        cells = values.shape[-2] * values.shape[-1]
-        # one map after the other: all at once they would fill gigabytes where steps reach far
-        for best, ahead in zip(found.reshape(-1, cells), values.reshape(-1, cells), strict=True):
-            if len(self.near):
-                best[self.near] = np.where(self.passable, ahead[self.targets], -np.inf).max(axis=1)
-        return found
-
-    def ahead(self, cell: int, shape: tuple[int, int]) -> Integers:
-        """Return the cells that steps from a `cell` lead to, by their number."""
-        at = np.flatnonzero(self.near == cell)
-        if len(at):
-            return np.asarray(self.targets[at[0]][self.passable[at[0]]])
-        row, column = np.divmod(np.arange(shape[0] * shape[1]), shape[1])
-        reach = dict(self.rows)
-        apart = np.abs(row - row[cell])
-        across = np.array([reach.get(step, -1) for step in range(int(apart.max()) + 1)])
-        return np.flatnonzero(np.abs(column - column[cell]) <= across[apart])
+    single = int(reach)
+    straight = round(np.clip(2 * single - np.sqrt(2) * reach, 0, single))
+    for k in range(single):
+        near = largest_near(values, disc(1.0 if k < straight else 1.5, 0))
+        values = np.where(inside, near, NOWHERE)
+    return values
 
 
 def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
