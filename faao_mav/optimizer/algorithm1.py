@@ -36,6 +36,7 @@ import scipy.sparse as sp
 from faao_mav.arrays import Complex, Real
 from faao_mav.errors import PlanError, SolverError
 from faao_mav.optimizer.design import Link
+from faao_mav.optimizer.interior.constraint import Grid
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.straight import straight_flight
@@ -126,12 +127,12 @@ def algorithm1(problem: Problem, *, observe: Observer | None = None) -> Solution
 
 def _precoders_at(problem: Problem, flight: Trajectory, last: Sequence[Complex]) -> list[Complex]:
     """Return the precoders of both links at `flight`: the plan's scheme, or (35) from `last`."""
-    scheme = SCHEMES.get(problem.plan.optimizer.precoder)
-    channels = [(link, link.channel(flight.w)) for link in problem.links]
-    if scheme is not None:
-        return [scheme(H, link.power, link.noise) for link, H in channels]
-    hops = zip(channels, last, strict=True)
-    return [optimize_precoders(link, H, P) for (link, H), P in hops]
+    scheme, found = SCHEMES.get(problem.plan.optimizer.precoder), []
+    for link, P in zip(problem.links, last, strict=True):
+        H = link.channel(flight.w)
+        new = scheme(H, link.power, link.noise) if scheme else optimize_precoders(link, H, P)
+        found.append(new)
+    return found
 
 
 def _check_plan(problem: Problem) -> None:
@@ -189,24 +190,20 @@ def link_sum(link: Link, H_r: Complex, P: Complex) -> SumOfExponentials:
     return SumOfExponentials(link, A, len(H_r) * (2 * classes.bits - classes.symbols))
 
 
-def xi(sums: Sequence[SumOfExponentials], w: Real) -> float:
-    """Return the least xi of (16) at positions w: the larger of both constraints."""
-    return max(s.excess(w) for s in sums)
-
-
 def optimize_trajectory(
     problem: Problem, sums: Sequence[SumOfExponentials], flight: Trajectory
 ) -> Trajectory:
     """Solve (27) again and again about its last solution, from the feasible `flight`.
 
-    The objective is xi, which never increases; its floor is the xi of two links without errors.
+    The objective is xi of (16), the larger of both constraints, which never increases; its floor is
+    that of two links without errors.
     Raises `SolverError` where Clarabel fails.
     """
     kin, floor = problem.kinematics, max(-s.offset for s in sums)
 
     def solved(last: Trajectory, gap: float) -> Trajectory:
         """Solve (27) about the flight `last`, with (xi - floor) / gap as the objective."""
-        flight, objective = flight_variables(kin), cp.Variable()
+        flight, objective = FlightVariables(kin), cp.Variable()
         constraints: list[Any] = list(flight.constraints)
         for s in sums:
             sum_lb, quadratic = convex_bound(s, last.w, flight.w, gap)
@@ -219,7 +216,7 @@ def optimize_trajectory(
 
     return _successively(
         flight,
-        lambda trajectory: xi(sums, trajectory.w),
+        lambda trajectory: max(s.excess(trajectory.w) for s in sums),
         solved,
         floor=floor,
         scale=len(flight.w) * max(s.link.classes.symbols for s in sums),
@@ -341,43 +338,29 @@ def _successively(
     return point
 
 
-@dataclass(frozen=True, slots=True)
 class FlightVariables:
-    """w, v, a (n, 2) of (11)-(13f), with their constraints: in about 100 m, v_max and a_max.
+    """w, v, a (n, 2) under the `constraints` (11), (12), (13d)-(13f): in 100 m, v_max and a_max.
 
     With metres as the unit Clarabel fails on (27).
     """
 
-    w: cp.Variable
-    v: cp.Variable
-    a: cp.Variable
-    constraints: list[Any]
-
-
-def flight_variables(kin: Kinematics) -> FlightVariables:
-    """Return new variables under (11), (12), (13d)-(13f)."""
-    n, dt = kin.slots, kin.time_step
-    w, v, a = (cp.Variable((n, 2)) for _ in range(3))
-    advance = kin.max_speed * dt / LENGTH
-    bend = kin.max_acceleration * dt**2 / 2 / LENGTH
-    gain = kin.max_acceleration * dt / kin.max_speed
-    constraints = [
-        w[1:] == w[:-1] + advance * v[:-1] + bend * a[:-1],
-        v[1:] == v[:-1] + gain * a[:-1],
-        w[0] == kin.start / LENGTH,
-        w[-1] == kin.end / LENGTH,
-        cp.norm(v, axis=1) <= 1,
-        cp.norm(a[kin.first_bounded_acceleration :], axis=1) <= 1,
-        a[-1] == 0,
-    ]
-    if np.isfinite(kin.max_airspeed):
-        wind = np.array(kin.wind) / kin.max_speed
-        constraints.append(cp.norm(v - wind, axis=1) <= kin.max_airspeed / kin.max_speed)
-    if kin.start_velocity is not None:
-        constraints.append(v[0] == kin.start_velocity / kin.max_speed)
-    if kin.end_velocity is not None:
-        constraints.append(v[-1] == kin.end_velocity / kin.max_speed)
-    return FlightVariables(w, v, a, constraints)
+    def __init__(self, kin: Kinematics) -> None:
+        n, grid, wind = kin.slots, Grid.of(kin), np.array(kin.wind) / kin.max_speed
+        self.w, self.v, self.a = w, v, a = [cp.Variable((n, 2)) for _ in range(3)]
+        self.constraints: list[Any] = [
+            w[1:] == w[:-1] + grid.advance * v[:-1] + grid.bulge * a[:-1],
+            v[1:] == v[:-1] + grid.gain * a[:-1],
+            w[0] == kin.start / LENGTH,
+            w[-1] == kin.end / LENGTH,
+            cp.norm(v, axis=1) <= 1,
+            cp.norm(a[kin.first_bounded_acceleration :], axis=1) <= 1,
+            a[-1] == 0,
+        ]
+        if np.isfinite(kin.max_airspeed):
+            self.constraints.append(cp.norm(v - wind, axis=1) <= kin.max_airspeed / kin.max_speed)
+        for end, velocity in ((0, kin.start_velocity), (-1, kin.end_velocity)):
+            if velocity is not None:
+                self.constraints.append(v[end] == velocity / kin.max_speed)
 
 
 def minimize(objective: cp.Expression, constraints: list[Any]) -> cp.Problem:

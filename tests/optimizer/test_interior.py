@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import block_diag
 
 from faao_mav.arrays import Real
-from faao_mav.optimizer.algorithm1 import FlightVariables, flight_variables, minimize
+from faao_mav.optimizer.algorithm1 import FlightVariables, minimize
 from faao_mav.optimizer.interior.constraint import A, Constraint, Grid, Rows, V, W
 from faao_mav.optimizer.interior.limits import Disc, EnergyLimit, SpeedChange, TurnRate
 from faao_mav.optimizer.interior.maximize import maximize
@@ -137,7 +137,7 @@ def still_gained(kin: Kinematics, stage: Stage, flight: Trajectory) -> float:
     """
     rewards = stage(flight.w.T)
     total, unit = rewards.value.mean(axis=1), float(np.abs(rewards.gradient).max())
-    near, gain = flight_variables(kin), cp.Variable()
+    near, gain = FlightVariables(kin), cp.Variable()
     shift = LENGTH * near.w - flight.w
     limits = [*near.constraints, cp.abs(shift) <= 1]
     for each, slope in zip(total, np.moveaxis(rewards.gradient, 1, 0), strict=True):
@@ -207,7 +207,7 @@ def test_concave_rewards_reach_the_global_optimum(kin: Kinematics) -> None:
     """Against CVXPY, from below and from above."""
     best = maximize(kin, STAGE, straight_flight(kin), tolerance=1e-8)
     assert worst(kin, best.trajectory) < 1e-6
-    expected = global_optimum(kin, flight_variables(kin), [])
+    expected = global_optimum(kin, FlightVariables(kin), [])
     assert best.value == pytest.approx(expected, rel=2e-5)
 
 
@@ -302,7 +302,7 @@ def test_a_half_plane_is_kept_at_the_global_optimum(side: Side) -> None:
     assert best.converged
     assert worst(kin, best.trajectory) < 1e-6
     assert side.excess(kin, best.trajectory) <= 1e-9
-    flight = flight_variables(kin)
+    flight = FlightVariables(kin)
     bounded = flight.a[kin.first_bounded_acceleration : -1]
     along = (flight.w if side.of == W else bounded) @ np.array(side.normal)
     kept = (cp.sum(along) / kin.slots if side.total else along) <= side.most

@@ -116,7 +116,7 @@ def test_steps_lead_around_a_wall_that_is_thinner_than_they_are_long() -> None:
                 assert reached[i, j] if way <= 4 else way < 4.5 or not reached[i, j]
             elif reached[i, j]:
                 assert inside[i, j]
-                assert np.hypot(8 - row, 5 - column) + np.hypot(8 - i, 5 - j) < 4.6
+                assert np.hypot(8 - row, 5 - column) + np.hypot(8 - i, 5 - j) < 4.9
 
 
 def delivered(I_U: Real, I_G: Real, kind: str) -> float:

@@ -11,7 +11,7 @@ from test_interior import ACTIVE, HEIGHT, STATIONS, copter, links, plane, worst
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
-from faao_mav.optimizer.algorithm1 import flight_variables, minimize
+from faao_mav.optimizer.algorithm1 import FlightVariables, minimize
 from faao_mav.optimizer.interior.maximize import maximize, objective
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
@@ -39,7 +39,7 @@ def test_the_global_optimum_of_concave_rates() -> None:
     stage = links(hill, 1e-5, 1.5e-5)
     relay = RelayQueue(buffer=buffer)
     best = maximize(kin, stage, straight_flight(kin), relay=relay, tolerance=1e-7)
-    flight, n = flight_variables(kin), kin.slots
+    flight, n = FlightVariables(kin), kin.slots
     received, forwarded, queue = (cp.Variable(n) for _ in range(3))
     rates = [
         3 - c * (HEIGHT**2 + LENGTH**2 * cp.sum(cp.square(flight.w - p[None] / LENGTH), axis=1))
