@@ -144,17 +144,12 @@ class FenceGeometry:
         It is the distance itself but where a path that bends around a corner is nearest between
         samples.
         """
-        least = np.inf
-        w, v, a = flight.w.T, flight.v.T, flight.a.T
-        if len(self.obstacles):
-            u, h = self.obstacles.separation(w[:, :-1], w[:, 1:])
-            nearest = _least_along(u, w, v, a, time_step) - h
-            least = min(least, float(nearest.min()))
-        if len(self.offsets):
-            inward = -self.normals.T[:, :, None]
-            nearest = _least_along(inward, w, v, a, time_step) + self.offsets[:, None]
-            least = min(least, float(nearest.min()))
-        return least
+        inward, w = (-self.normals.T[:, :, None], -self.offsets[:, None]), flight.w.T
+        sides = [self.obstacles.separation(w[:, :-1], w[:, 1:])] if len(self.obstacles) else []
+        away = (
+            _least_along(u, w, flight.v.T, flight.a.T, time_step) - h for u, h in (*sides, inward)
+        )
+        return min(float(each.min(initial=np.inf)) for each in away)
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
         """Return by how much the path of `flight` comes too near, in solver units; 0 if nowhere."""

@@ -256,8 +256,7 @@ def thriftiest_straight(plan: Plan) -> tuple[float, float]:
     slots = np.linspace(fewest_slots(plan), plan.flight.slots, _COMPARED).astype(int)
     for n in np.unique(slots).tolist():
         kin = replace(problem.kinematics, slots=n)
-        limit = problem.energy_limit(kin)
-        assert limit is not None
+        (limit,) = problem.energy_limits(kin)
         with suppress(InfeasibleError):
             energy = limit.used(straight_flight(kin)) - limit.most  # and the relay's
             taken.append(((1 + _ABOVE) * energy, round(n * kin.time_step, 9)))

@@ -88,8 +88,7 @@ class Problem:
 
     def constraints(self, kin: Kinematics) -> tuple[Constraint, ...]:
         """Return what flights of `kin` have to keep beside the limits of the aircraft."""
-        energy = self.energy_limit(kin)
-        return (*self.fenced(kin), *([] if energy is None else [energy]))
+        return (*self.fenced(kin), *self.energy_limits(kin))
 
     def limits(self, kin: Kinematics) -> tuple[Constraint, ...]:
         """Return all that flights of `kin` have to keep."""
@@ -115,12 +114,12 @@ class Problem:
         power = model(np.pad(flight.v - kin.wind, level), np.pad(flight.a, level))
         return kin.time_step * float(power.sum()) + self._radiated(kin)
 
-    def energy_limit(self, kin: Kinematics) -> EnergyLimit | None:
-        """Return the limit on the energy of flights of `kin`; None where there is none."""
+    def energy_limits(self, kin: Kinematics) -> tuple[EnergyLimit, ...]:
+        """Return the limit on the energy of flights of `kin`, if there is one."""
         model = self.plan.power_model
         if model is None or self.energy == math.inf:
-            return None
-        return EnergyLimit(model, self.energy - self._radiated(kin), kin)
+            return ()
+        return (EnergyLimit(model, self.energy - self._radiated(kin), kin),)
 
     def _radiated(self, kin: Kinematics) -> float:
         """Return what the relay's radio sends, J."""

@@ -257,8 +257,7 @@ class Solution:
         """
         problem, clearance = self.problem, self.clearance()
         found = problem.kinematics.residuals(self.trajectory)
-        limit = problem.energy_limit(problem.kinematics)
-        if limit is not None:
+        for limit in problem.energy_limits(problem.kinematics):
             found["energy"] = limit.excess(problem.kinematics, self.trajectory)
         if problem.fence is not None and clearance is not None:
             found["fence"] = max(0.0, problem.fence.margin - clearance)

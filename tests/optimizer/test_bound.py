@@ -237,10 +237,9 @@ def test_best_rates_are_those_of_the_channel_or_above(small_plan: MakePlan) -> N
         problem = build_problem(small_plan(FAINT | changes))
         link = problem.uav_user
         w = link.gains.station + np.random.default_rng(0).uniform(-80, 80, (20, 2))
-        values, exact = best_at(problem, link, link.gains.log(w.T)[:, None])
+        values = best_at(problem, link, link.gains.log(w.T)[:, None])
         H = link.channel(w)
         true = link.draw_rates(H, link.best(H[:, None]))
-        assert exact
         assert (values[:, 0] >= true - 1e-6).all()
         if "radio.line_of_sight" in changes:
             assert values[:, 0] == pytest.approx(true, abs=1e-6)

@@ -29,13 +29,11 @@ _GAINS = 2_000
 class BestRates:
     """Upper bounds on the best rates of both links by l: they rise with it.
 
-    `values` (2, slots or 1, m) at evenly rising l, `gain_logs` (2, m), bits; `exact` tells that the
-    best precoders have a closed form.
+    `values` (2, slots or 1, m) at evenly rising l, `gain_logs` (2, m), bits.
     """
 
     gain_logs: Real
     values: Real
-    exact: bool
 
     @property
     def known(self) -> bool:
@@ -53,29 +51,27 @@ def best_rates(problem: Problem) -> BestRates:
     """Return upper bounds on the best rates at all gains that a flight can have."""
     links = problem.links
     known = any(link.nlos is not None and not link.averaged for link in links)
-    gain_logs, values, exact = [], [], True
+    gain_logs, values = [], []
     for link in links:
         ends = link.gains.extremes(problem.farthest(link))
         gain_log = np.linspace(*ends, _GAINS)
         slots = problem.kinematics.slots if known else 1
-        best, is_exact = best_at(problem, link, np.broadcast_to(gain_log, (slots, len(gain_log))))
+        best = best_at(problem, link, np.broadcast_to(gain_log, (slots, len(gain_log))))
         # A curve rises by at most h² |R''| / 8 above its chord; the double allows for R'' being
         # known on the grid only.
         best = best + np.abs(np.diff(best, 2, axis=1)).max(axis=1, keepdims=True) / 4
         gain_logs.append(gain_log)
         values.append(np.maximum.accumulate(best, axis=1))
-        exact &= is_exact
-    return BestRates(np.stack(gain_logs), np.stack(values), exact)
+    return BestRates(np.stack(gain_logs), np.stack(values))
 
 
-def best_at(problem: Problem, link: Link, gain_log: Real) -> tuple[Real, bool]:
-    """Return the best rate of every slot at l (n, m), bits, and whether it is exact.
+def best_at(problem: Problem, link: Link, gain_log: Real) -> Real:
+    """Return the best rate of every slot at l (n, m), bits.
 
     Where a draw is known for every slot and the channel depends on the direction, the result is an
     upper bound: each singular value of H_r is the largest over all directions.
     """
     optimal = replace(design(problem.plan), scheme="faao", gaussian=False)
-    exact = link.closed_form and link.measure == "cutoff"
     if link.steps is not None:
         link = replace(link, steps=link.steps.widened(_WIDTH, above=True))
     slots, gain_log = len(gain_log), gain_log.T
@@ -88,14 +84,14 @@ def best_at(problem: Problem, link: Link, gain_log: Real) -> tuple[Real, bool]:
     if kind_of(link, optimal):
         span = np.array([gain_log.min(), gain_log.max()])
         (table,) = table_rates([(link, span)], optimal)
-        return table.value(gain_log, np.zeros(slots)).T, not optimal.averaged and exact
+        return table.value(gain_log, np.zeros(slots)).T
     # One gain after the other, each search starting from the precoders of the last.
     from scipy.interpolate import CubicSpline
 
     levels = np.linspace(gain_log.min(), gain_log.max(), _SEARCHED)
     each, every = SlotRate(link, optimal), np.ones(slots)
     rates = [each.value(level * every, every) for level in levels]
-    return np.asarray(CubicSpline(levels, rates)(gain_log[:, 0])).T, exact
+    return np.asarray(CubicSpline(levels, rates)(gain_log[:, 0])).T
 
 
 def _largest_singular_values(link: Link, slots: int) -> Real:

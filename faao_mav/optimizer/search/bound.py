@@ -73,4 +73,8 @@ def upper_bound(problem: Problem, known: float = 0.0, *, observe: Observer | Non
             value = min(value, map_bound(problem, rates))
         value = max(known, value)
     tell(2, "the bound", value)
-    return Bound(value, rates.exact)
+    exact = all(
+        link.closed_form and link.measure == "cutoff" and not link.averaged
+        for link in problem.links
+    )
+    return Bound(value, exact)

@@ -263,7 +263,7 @@ def improved_over_map(
     """
     kin, relay = problem.kinematics, problem.maximised_queue
     smooth, side = field.smoothed(), _side(problem, CELLS[0])
-    energy, limits = problem.energy_limit(kin), (*constraints_of(kin), *problem.fenced(kin))
+    limits = (*constraints_of(kin), *problem.fenced(kin))
 
     now, worth = start, _worth(problem, field, start)
     best = LocalOptimum(start, worth, 0, np.inf, False)
@@ -275,7 +275,7 @@ def improved_over_map(
                 now,
                 constraints=(
                     *problem.fenced(kin, (now.w, radius * side)),
-                    *([] if energy is None else [energy]),
+                    *problem.energy_limits(kin),
                     Disc(W, 1.0, now.w.T / LENGTH, unit=radius * side / LENGTH),
                 ),
                 tolerance=problem.plan.optimizer.tolerance,

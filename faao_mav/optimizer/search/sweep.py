@@ -79,16 +79,19 @@ def largest_near(values: Real, rows: Sequence[tuple[int, int]]) -> Real:
 def largest_ahead(values: Real, inside: Flags, reach: float) -> Real:
     """Return the largest of `values` (..., i, j) that a step from each cell leads to.
 
-    A step goes `reach` sides over cells that are `inside` (i, j), from each to one of its eight
-    neighbours or of its four: as often as makes an octagon of about the size of the disc. So it
-    leads around obstacles that are thinner than it is long.
+    A step goes `reach` sides over cells that are `inside` (i, j). Where others are in its reach it
+    goes from each to one of its eight neighbours or of its four, as often as makes an octagon of
+    about the size of the disc: so it leads around obstacles that are thinner than it is long.
     """
-    single = int(reach)
+    rows, single = disc(reach, 0), int(reach)
+    found, blocked = largest_near(values, rows), largest_near(1.0 * ~inside, rows) > 0
+    if not blocked.any():
+        return found
     straight = round(np.clip(2 * single - np.sqrt(2) * reach, 0, single))
     for k in range(single):
         near = largest_near(values, disc(1.0 if k < straight else 1.5, 0))
         values = np.where(inside, near, NOWHERE)
-    return values
+    return np.where(blocked, values, found)
 
 
 def largest_within(values: Real, reaches: Iterable[int]) -> dict[int, Real]:
