@@ -18,6 +18,7 @@ import numpy as np
 from faao_mav.arrays import Flags, Real
 from faao_mav.mission.fence_area import OUTSIDE, free_area
 from faao_mav.mission.polygons import convex_pieces
+from faao_mav.optimizer.interior.constraint import TINY
 from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
 from faao_mav.plan import Plan
 
@@ -27,10 +28,6 @@ Chosen."""
 
 _SIMPLER = 0.05
 """By how much, m, arcs are simplified where one of several inclusions is enough. Chosen."""
-
-
-_SHORTEST = 1e-12
-"""The least length that a direction is divided by; far below a rounding error of positions."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,7 @@ class ConvexObstacles:
 def _unit(vectors: Real, axis: int) -> Real:
     """Return `vectors` divided by their lengths; those without one are zero, no direction."""
     length = np.sqrt((vectors**2).sum(axis=axis, keepdims=True))
-    return np.asarray(vectors / np.maximum(length, _SHORTEST))
+    return np.asarray(vectors / np.maximum(length, TINY))
 
 
 def _dot(x: Real, y: Real) -> Real:

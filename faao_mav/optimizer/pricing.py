@@ -41,9 +41,6 @@ _FRESH_DRAWS, _FRESH_SLOTS = 64, 256
 """New draws of the fading per slot where one precoder serves all draws, and slots with some, at
 most. Chosen."""
 
-_MAX_SPARE_DB = 300.0
-"""The largest spare power that is looked for, dB: beyond any link. Chosen."""
-
 
 @dataclass(frozen=True, slots=True)
 class MutualInformation:
@@ -201,6 +198,6 @@ def saturation(solution: Solution) -> Saturation:
 
     if spare(0.0) < 0:
         return Saturation(ceiling, 0.0)
-    from scipy.optimize import brentq  # slow to load
+    from scipy.optimize import brentq  # slow to load; no link has 300 dB to spare
 
-    return Saturation(ceiling, float(brentq(spare, 0.0, _MAX_SPARE_DB)))
+    return Saturation(ceiling, float(brentq(spare, 0.0, 300.0)))

@@ -157,10 +157,7 @@ def way_between(plan: Plan, start: Real, end: Real) -> Real | None:
     nearest place on that does. None where there is no such way inside the fence.
     """
     fence, margin = plan.keep_in, plan.margin
-    if fence is None:
-        return np.array([start, end])
-    kept = _kept(fence, margin)
-    if kept.covers_path(np.array([start, end])):
+    if fence is None or (kept := _kept(fence, margin)).covers_path(np.array([start, end])):
         return np.array([start, end])
     begin = start
     if not kept.covers(start[None]).all():

@@ -6,7 +6,6 @@ how the vehicle speeds up or turns: the schedulers fit it to the predicted fligh
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -89,22 +88,21 @@ class Route:
         `speeds` (k,), m/s, are those of the legs that begin there; behind the last waypoint, of the
         leg that ends there. `first` and `last` stay with their waypoints.
         """
-        values: dict[str, Any] = {
-            "positions": positions,
-            "arrivals": times,
-            "departures": times,
-            "speeds": speeds,
-            "waits": 0.0,
-            "radii": 0.0,
-        }
-        arrays = {name: getattr(self, name) for name in values}
-        longer = {
-            name: np.insert(array, np.minimum(at, len(array)), values[name], axis=0)
-            for name, array in arrays.items()
-        }
-        first = self.first + int(np.sum(at <= self.first))
-        last = self.last + int(np.sum(at <= self.last))
-        return replace(self, **longer, first=first, last=last)
+
+        def longer(array: Real, values: Real | float) -> Real:
+            return np.insert(array, np.minimum(at, len(array)), values, axis=0)
+
+        return Route(
+            positions=longer(self.positions, positions),
+            arrivals=longer(self.arrivals, times),
+            departures=longer(self.departures, times),
+            speeds=longer(self.speeds, speeds),
+            waits=longer(self.waits, 0.0),
+            radii=longer(self.radii, 0.0),
+            first=self.first + int(np.sum(at <= self.first)),
+            last=self.last + int(np.sum(at <= self.last)),
+            lead=self.lead,
+        )
 
 
 def sent_speeds(speeds: Real, max_speed: float) -> Real:

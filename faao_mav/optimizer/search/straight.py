@@ -19,9 +19,6 @@ from faao_mav.optimizer.interior.constraint import every_excess
 from faao_mav.optimizer.interior.maximize import constraints_of, nearest_flight
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 
-_ALONG = 1e-12
-"""The velocity across a line, in shares of v_max, that counts as none: rounding errors."""
-
 _TURN_SHARE = 0.95
 """Share of the largest acceleration that turns use; the rest is for meeting the ends, and for
 rounding to samples. Chosen."""
@@ -74,7 +71,7 @@ def _along_line(kin: Kinematics) -> Real | None:
     lines = [line, *ends, np.array([1.0, 0.0])]
     direction = next(each / np.hypot(*each) for each in lines if each.any())
     across = np.array([-direction[1], direction[0]])
-    if any(abs(v @ across) > _ALONG * kin.max_speed for v in ends):
+    if any(abs(v @ across) > _TOLERANCE for v in ends):
         return None
     speed = even_speed(kin, direction, distance)
     return None if speed is None else speed[:, None] * direction
