@@ -148,34 +148,30 @@ def starts_over_map(problem: Problem, field: RateField) -> dict[str, Trajectory]
 
 
 def flights_over_map(problem: Problem, field: RateField, cells: int) -> Iterator[Trajectory]:
-    """Yield flights along paths over so many `cells`, the farthest from obstacles first."""
-    path = np.empty((0, 2))
-    for room in (0.0,) if problem.free_area is None else _ROOMS:
+    """Yield flights that keep the fence along paths over so many `cells`.
+
+    The farthest from obstacles come first. Of a path they are the nearest, and that which stops
+    where the way bends about obstacles.
+    """
+    kin, area, path = problem.kinematics, problem.free_area, np.empty((0, 2))
+    limits = (*constraints_of(kin), *problem.fenced(kin))
+    t = kin.time_step * np.arange(kin.slots)
+    for room in (0.0,) if area is None else _ROOMS:
         sweep = queue_sweep(problem, field, cells, room)
         before, path = path, sweep.path()
-        if not np.array_equal(before, path):
-            yield from _flown(problem, sweep, path)
-
-
-def _flown(problem: Problem, sweep: QueueSweep, places: Real) -> Iterator[Trajectory]:
-    """Yield flights that keep the fence along the `places` (K, 2) of a `sweep`, m.
-
-    They are the nearest, and that which stops where the way bends about obstacles.
-    """
-    kin, area = problem.kinematics, problem.free_area
-    t = kin.time_step * np.arange(kin.slots)
-    at = np.concatenate([[0.0], sweep.cells.instants, t[-1:]])
-    at, places = _around(area, at, np.vstack([kin.start, places, kin.end]))
-    path = np.stack([np.interp(t, at, each) for each in places.T], axis=1)
-    about = problem.fenced(kin, (path, _NEAR * sweep.cells.side))
-    flights = [nearest_flight(kin, path, straight_flight(kin), about)]
-    if area is not None and kin.min_speed == 0:
-        bends = _bends(area, places)
-        flights.append(with_stops(kin, [*places[bends]], at[bends]))
-    limits = (*constraints_of(kin), *problem.fenced(kin))
-    for flight in flights:
-        if flight is not None and every_excess(kin, limits, flight) <= ALLOWED:
-            yield flight
+        if np.array_equal(before, path):
+            continue
+        at = np.concatenate([[0.0], sweep.cells.instants, t[-1:]])
+        at, places = _around(area, at, np.vstack([kin.start, path, kin.end]))
+        along = np.stack([np.interp(t, at, each) for each in places.T], axis=1)
+        about = problem.fenced(kin, (along, _NEAR * sweep.cells.side))
+        flights = [nearest_flight(kin, along, straight_flight(kin), about)]
+        if area is not None and kin.min_speed == 0:
+            bends = _bends(area, places)
+            flights.append(with_stops(kin, [*places[bends]], at[bends]))
+        for flight in flights:
+            if flight is not None and every_excess(kin, limits, flight) <= ALLOWED:
+                yield flight
 
 
 def _bends(area: FreeArea, places: Real) -> list[int]:

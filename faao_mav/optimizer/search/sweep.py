@@ -120,7 +120,12 @@ def cells_of(
     corners = np.vstack([kin.start, kin.end, places])
     since, until = kin.longest_ways()
     if free is not None:
-        corners = np.vstack([corners, _edges(free, kin, float(since[-1]))])
+        import shapely
+
+        rings = shapely.get_coordinates(free.shape)
+        inner = rings[np.abs(rings).max(axis=1) < 0.99 * FARTHEST]
+        reached = kin.start - since[-1], kin.start + since[-1]  # corners beyond are drawn nearer
+        corners = np.vstack([corners, np.clip(inner, *reached)])
     low, high = corners.min(axis=0), corners.max(axis=0)
     extent = np.maximum(high - low, _THINNEST * float((high - low).max()) + 1.0)
     duration = kin.time_step * (kin.slots - 1)
@@ -149,12 +154,3 @@ def cells_of(
         inside = area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
     step = kin.max_speed * float(np.diff(instants).max(initial=0.0)) / side
     return Cells(x, side, blocks, instants, alive & inside, disc(step))
-
-
-def _edges(free: FreeArea, kin: Kinematics, reach: float) -> Real:
-    """Return the corners (k, 2) of `free`, m, those beyond `reach` of the start drawn nearer."""
-    import shapely
-
-    rings = shapely.get_coordinates(free.shape)
-    inner = rings[np.abs(rings).max(axis=1) < 0.99 * FARTHEST]
-    return np.asarray(np.clip(inner, kin.start - reach, kin.start + reach))
