@@ -84,7 +84,7 @@ def largest_ahead(values: Real, inside: Flags, reach: float) -> Real:
     about the size of the disc: so it leads around obstacles that are thinner than it is long.
     """
     rows, single = disc(reach, 0), int(reach)
-    found, blocked = largest_near(values, rows), largest_near(1.0 * ~inside, rows) > 0
+    found, blocked = largest_near(values, rows), largest_near(np.where(inside, 0.0, 1.0), rows) > 0
     if not blocked.any():
         return found
     straight = round(np.clip(2 * single - np.sqrt(2) * reach, 0, single))
