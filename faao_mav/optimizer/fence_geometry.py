@@ -15,11 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from faao_mav.arrays import Flags, Real
+from faao_mav.arrays import Real
 from faao_mav.mission.fence_area import OUTSIDE, free_area
 from faao_mav.mission.polygons import convex_pieces
 from faao_mav.optimizer.interior.constraint import TINY
-from faao_mav.optimizer.kinematics import LENGTH, Kinematics, Trajectory
+from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.plan import Plan
 
 _SIDES = 64
@@ -48,10 +48,6 @@ class ConvexObstacles:
         padded = [np.pad(piece, ((0, most - len(piece)), (0, 0)), "edge") for piece, _ in pieces]
         radii = np.array([radius for _, radius in pieces], dtype=np.float64)
         return cls(np.array(padded).reshape(-1, most, 2), radii)
-
-    def only(self, kept: Flags) -> "ConvexObstacles":
-        """Return those obstacles that are `kept` (P,)."""
-        return ConvexObstacles(self.corners[kept], self.radius[kept])
 
     def __len__(self) -> int:
         return len(self.corners)
@@ -130,10 +126,11 @@ class FenceGeometry:
         """Return it with the obstacles within a `distance`, m, of a `path` (n, 2) alone."""
         import shapely
 
-        shapes = [shapely.MultiPoint(each).convex_hull for each in self.obstacles.corners]
-        away = shapely.distance(shapes, shapely.LineString(path)) - self.obstacles.radius
+        corners, radius = self.obstacles.corners, self.obstacles.radius
+        shapes = [shapely.MultiPoint(each).convex_hull for each in corners]
+        away = shapely.distance(shapes, shapely.LineString(path)) - radius
         kept = away <= distance + self.margin
-        return replace(self, obstacles=self.obstacles.only(kept))
+        return replace(self, obstacles=ConvexObstacles(corners[kept], radius[kept]))
 
     def clearance(self, flight: Trajectory, time_step: float) -> float:
         """Return a lower bound of the distance of the continuous path of `flight`, m.
@@ -147,10 +144,6 @@ class FenceGeometry:
             _least_along(u, w, flight.v.T, flight.a.T, time_step) - h for u, h in (*sides, inward)
         )
         return min(float(each.min(initial=np.inf)) for each in away)
-
-    def excess(self, kin: Kinematics, flight: Trajectory) -> float:
-        """Return by how much the path of `flight` comes too near, in solver units; 0 if nowhere."""
-        return max(0.0, self.margin - self.clearance(flight, kin.time_step)) / LENGTH
 
 
 def _least_along(u: Real, w: Real, v: Real, a: Real, dt: float) -> Real:

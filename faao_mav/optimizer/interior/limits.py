@@ -177,8 +177,9 @@ class _Fence(Constraint):
     inside = 1e-6
 
     def excess(self, kin: Kinematics, flight: Trajectory) -> float:
-        """Return `FenceGeometry.excess`."""
-        return self.geometry.excess(kin, flight)
+        """Return by how much the path of `flight` comes too near, in solver units; 0 if nowhere."""
+        clearance = self.geometry.clearance(flight, kin.time_step)
+        return max(0.0, self.geometry.margin - clearance) / LENGTH
 
 
 @dataclass(frozen=True)
