@@ -20,7 +20,6 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.optimizer.design import Link
 from faao_mav.optimizer.fence_geometry import FenceGeometry
 from faao_mav.optimizer.interior.maximize import objective
-from faao_mav.optimizer.kinematics import LENGTH as METRES
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import RateField
@@ -333,7 +332,7 @@ def delivered(
         found = model.solve(rates, flight)
         seconds.append(time.process_time() - began)
         beyond = [*kin.residuals(found).values()]
-        beyond += [] if fence is None else [METRES * fence.excess(kin, found)]
+        beyond += [] if fence is None else [fence.margin - fence.clearance(found, kin.time_step)]
         sound = max(beyond) < kept
         reached.append(objective(field.value(found.w.T), kin, relay) if sound else 0.0)
     return reached, seconds
