@@ -256,27 +256,6 @@ def write_together(contents: Mapping[str | Path, bytes]) -> None:
                 temporary.replace(target)
 
 
-def append_whole(path: str | Path, content: bytes) -> None:
-    """Add `content` at the end of the file `path`: all of it, or the file stays as it was.
-
-    On a full disk a part of it would fit. Raises `InputError`.
-    """
-    with _writing(path), Path(path).open("ab", buffering=0) as file:
-        before, left = file.tell(), memoryview(content)
-        try:
-            while left:
-                left = left[file.write(left) :]
-        except BaseException:
-            file.truncate(before)
-            raise
-
-
-def cut(path: str | Path, size: int) -> None:
-    """Take away what the file `path` has beyond `size` bytes. Raises `InputError`."""
-    with _writing(path):
-        os.truncate(path, size)
-
-
 @contextlib.contextmanager
 def _writing(path: str | Path) -> Iterator[None]:
     try:

@@ -6,14 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from full_disk import files_of_at_most
 
 from faao_mav.errors import InputError, PlanError
 from faao_mav.files import (
-    append_whole,
     check_apart,
     check_writable,
-    cut,
     read_text,
     write_together,
     write_whole,
@@ -52,24 +49,6 @@ def test_a_failure_leaves_the_old_files_and_nothing_else(
         write_whole(path, b"new")
     assert path.read_bytes() == other.read_bytes() == b"old"
     assert {*tmp_path.iterdir()} == {path, other}
-
-
-def test_what_is_added_is_added_whole_or_not_at_all(tmp_path: Path) -> None:
-    path = tmp_path / "rows"
-    append_whole(path, b"one\n")
-    append_whole(path, b"two\n")
-    with (
-        files_of_at_most(10),
-        pytest.raises(InputError, match="rows: cannot be written: File too large"),
-    ):
-        append_whole(path, b"three\n")  # two of its bytes fit
-    assert path.read_bytes() == b"one\ntwo\n"
-    append_whole(path, b"three\n")
-    cut(path, 4)
-    assert path.read_bytes() == b"one\n"
-    for full in (tmp_path / "absent" / "rows", Path("/dev/full")):
-        with pytest.raises(InputError, match=f"{full}: cannot be written"):
-            append_whole(full, b"x")
 
 
 def test_what_is_no_place_for_a_file_or_no_file(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ def study(
     """Optimise a plan with many values, schemes and seeds, and compare.
 
     Options replace what the plan's `study` section says. With --out the directory gets
-    rows.jsonl while it runs, and table.csv, figure.svg and figure.png at the end.
+    rows while it runs, a file each, and table.csv, figure.svg and figure.png at the end.
 
     Exit status: 0 done; 1 no row has a result; 2 unusable arguments or input; 130 interrupted.
     """
@@ -123,7 +123,7 @@ def study(
         raise typer.Exit(_INTERRUPTED) from None
     written = []
     if out is not None:
-        written, kind = [out / "rows.jsonl", out / "table.csv"], (plan.study or Study()).figure
+        written, kind = [out / "rows", out / "table.csv"], (plan.study or Study()).figure
         try:
             figure = frontier_figure(rows, plan, along) if along else study_figure(rows, plan, kind)
         except InputError:

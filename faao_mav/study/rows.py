@@ -16,15 +16,14 @@ from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, place_of
-from faao_mav.files import append_whole, cut, read_bytes
+from faao_mav.files import read_bytes, write_whole
 from faao_mav.study.sweep import StudyCase, Value
 
-ROWS, TABLE = "rows.jsonl", "table.csv"
-_BEGINNING = b'{"key": "'
-"""How the line of every row begins: a last line without an end that does not is no row cut off."""
+ROWS, TABLE = "rows", "table.csv"
+"""The folder of a study's rows, a file for each, and its table."""
 
-MAX_BYTES = 100_000_000
-"""Bytes of the rows of a study that are read; chosen: 9,000 flights of 600 slots."""
+MAX_BYTES = 10_000_000
+"""Bytes of a row that are read; chosen: a flight of 500,000 slots."""
 
 
 def _route(pairs: object) -> Real:
@@ -108,11 +107,11 @@ def as_array(rows: Sequence[StudyRow]) -> NDArray[np.void]:
     return made
 
 
-def append_row(row: StudyRow, directory: Path) -> None:
-    """Add `row` to the directory's rows. Raises `InputError`, and leaves them as they were."""
-    line = json.dumps(asdict(row) | {"route": row.route.tolist()}, allow_nan=False) + "\n"
+def keep_row(row: StudyRow, directory: Path) -> None:
+    """Write the file of `row` in the `directory` of its study. Raises `InputError`."""
+    content = json.dumps(asdict(row) | {"route": row.route.tolist()}, allow_nan=False)
     try:
-        append_whole(directory / ROWS, line.encode())
+        write_whole(directory / ROWS / f"{row.key}.json", content.encode())
     except InputError as error:
         raise InputError(
             f"{error}; the rows before are kept, and the same command goes on there"
@@ -122,35 +121,22 @@ def append_row(row: StudyRow, directory: Path) -> None:
 def load_rows(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ...]:
     """Return the finished rows of `cases` in `directory`, in the order of the grid.
 
-    A last line that was cut off when the machine stopped is dropped from the file. Raises
-    `InputError` for anything else that is no row.
+    Raises `InputError` for a file that holds no row.
     """
-    path = directory / ROWS
-    if not path.exists():
-        return ()
-    content = read_bytes(path, MAX_BYTES, "the rows of a study")
-    rows: dict[str, StudyRow] = {}
-    for number, line in enumerate(io.BytesIO(content), 1):
-        if not line.endswith(b"\n"):
-            if line[: len(_BEGINNING)] != _BEGINNING[: len(line)]:
-                raise InputError(
-                    f"{path}: its last line is no row of a study; give another directory"
-                )
-            cut(path, len(content) - len(line))
-            break
-        row = _row(line, f"{path}: line {number}")
-        rows[row.key] = row
-    return in_order(cases, rows)
+    files = {path.stem: path for path in (directory / ROWS).glob("*.json")}
+    keys = [case.key for case in cases]
+    return in_order(cases, {key: _row(files[key]) for key in keys if key in files})
 
 
-def _row(line: bytes, where: str) -> StudyRow:
-    """Return the row in a line of the file, without its values: the case has them."""
+def _row(path: Path) -> StudyRow:
+    """Return the row in the file `path`, without its values: the case has them."""
     try:
-        return replace(_ROW.validate_json(line), values={})
+        row = _ROW.validate_json(read_bytes(path, MAX_BYTES, "a row of a study"))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         told = f"{place_of(first['loc'])}: {first['msg']}".removeprefix(": ")
-        raise InputError(f"{where}: no row of a study: {told}; give another directory") from None
+        raise InputError(f"{path}: no row of a study: {told}; remove it") from None
+    return replace(row, values={})
 
 
 def table(rows: Sequence[StudyRow]) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from faao_mav.errors import FaaoError, InputError, check_extra
 from faao_mav.files import check_writable, write_whole
 from faao_mav.processes import apart_from_the_current_directory
-from faao_mav.study.rows import TABLE, StudyRow, append_row, in_order, load_rows, table
+from faao_mav.study.rows import ROWS, TABLE, StudyRow, in_order, keep_row, load_rows, table
 from faao_mav.study.sweep import StudyCase
 
 _CONNECTING = 10
@@ -81,7 +81,7 @@ def run_study(
         try:
             for row in running:
                 if directory is not None:
-                    append_row(row, directory)
+                    keep_row(row, directory)
                 done[row.key] = row
                 tell(row)
         finally:
@@ -126,10 +126,8 @@ def _connected(address: str) -> Iterator[None]:
 
 def _prepare(directory: Path, cases: Sequence[StudyCase]) -> tuple[StudyRow, ...]:
     try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise InputError(f"{directory}: is a file; give a directory") from None
+        (directory / ROWS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{directory}: cannot be made: {error.strerror or error}") from None
+        raise InputError(f"{directory / ROWS}: cannot be made: {error.strerror or error}") from None
     check_writable(directory / TABLE)
     return load_rows(directory, cases)

@@ -87,11 +87,12 @@ def targets(directory: Path) -> dict[str, Target]:
     cases = make_cases(brief, vary={"flight.altitude": [40, 50]})
     run_study(cases, jobs=1, directory=directory)
 
-    def rows(path: Path) -> object:
-        found = load_rows(path.parent, cases)
+    def rows(_: Path) -> object:
+        found = load_rows(directory, cases)
         return table(found), comparison(found)
 
-    add("rows", ROWS, rows, (directory / ROWS).read_bytes())
+    kept = f"{ROWS}/{cases[0].key}.json"
+    add("rows", kept, rows, (directory / kept).read_bytes())
     for ending, content in _logs().items():
         add(ending, f"flight.{ending}", _log, content)
     found["vary"] = Target("vary", _vary, _VALUES, mutate.text)

@@ -15,7 +15,7 @@ from wire_targets import datagrams, wire_targets
 FILES = ("plan", "fenced_plan", "gain", "rates", "kml", "geojson", "wpl", "qgc_plan", "parameters",
          "map", "map_table", "npz", "rows", "bin", "tlog", "ulg", "vary")  # fmt: skip
 TAPES = {"client": 10, "mock_ardupilot": 6, "mock_px4": 4}
-SLOW = dict.fromkeys(("bin", "tlog", "ulg", "npz", "gain", "rates", "rows", "vary"), 30)
+SLOW = dict.fromkeys(("bin", "tlog", "ulg", "npz", "gain", "rates", "vary"), 30)
 CASES = dict.fromkeys(FILES, 60) | SLOW | TAPES
 """Cases of each target in the suite; chosen: an eighth of a second."""
 

@@ -9,7 +9,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -97,10 +97,7 @@ def test_a_resumed_study_is_the_uninterrupted_one(tmp_path: Path, whole: Whole) 
 
     with pytest.raises(KeyboardInterrupt):
         run_study(CASES, jobs=1, directory=tmp_path, observe=stop)
-    rows = tmp_path / "rows.jsonl"
-    kept = rows.read_bytes()
-    assert kept.count(b"\n") == 2
-    rows.write_bytes(kept + kept[:100])  # the machine stopped in the middle of a row
+    assert len([*(tmp_path / "rows").iterdir()]) == 2
     again = run_study(CASES, jobs=1, directory=tmp_path)
     assert timeless(again) == timeless(whole[1])
     assert again[:2] == tuple(seen)  # not run again
@@ -143,14 +140,14 @@ def test_what_is_refused(plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
         result = run(plan, *arguments, "--out", tmp_path / "out")
         assert result.exit_code == 2, result.output
         assert told in result.stderr
-    assert not (tmp_path / "out" / "rows.jsonl").exists()
+    assert not (tmp_path / "out").exists()
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="file: is a file; give a directory"):
+    with pytest.raises(InputError, match="file/rows: cannot be made: Not a directory"):
         run_study(CASES, jobs=1, directory=tmp_path / "file")
     (tmp_path / "table.csv").mkdir()
     with pytest.raises(InputError, match=r"table\.csv: is a directory"):
         run_study(CASES, jobs=1, directory=tmp_path)
-    assert not (tmp_path / "rows.jsonl").exists()
+    assert [*(tmp_path / "rows").iterdir()] == []
 
 
 def test_options_go_before_the_plans_study_and_a_failing_row_is_one(
@@ -183,50 +180,39 @@ def test_options_go_before_the_plans_study_and_a_failing_row_is_one(
     assert "ergodic" in result.stdout
 
 
-def test_what_is_no_row_is_refused_by_its_line(whole: Whole, tmp_path: Path) -> None:
-    first, second, *_ = (whole[0] / "rows.jsonl").read_text().splitlines()
-    rows = tmp_path / "rows.jsonl"
-    for changes, said in (
-        ({"seed": "0"}, "seed: Input should be a valid integer"),
-        ({"delivered": float("nan")}, "delivered: Input should be a finite number"),
-        ({"route": [[1, 2], [3]]}, "route: Value error, not pairs of finite numbers"),
-        ({"route": [[1e999, 0]]}, "route: Value error, not pairs of finite numbers"),
-        ({"more": 1}, "more: Unexpected keyword argument"),
-    ):
-        edit = json.dumps(json.loads(second) | cast(dict[str, Any], changes))
-        rows.write_text(f"{first}\n{edit}\n")
-        with pytest.raises(InputError, match=rf"rows\.jsonl: line 2: no row of a study: {said}"):
+def test_what_is_no_row_is_refused_by_its_file(whole: Whole, tmp_path: Path) -> None:
+    name = f"rows/{CASES[1].key}.json"
+    sound, kept = json.loads((whole[0] / name).read_text()), tmp_path / name
+    kept.parent.mkdir()
+    changed: dict[str, dict[str, Any]] = {
+        "seed: Input should be a valid integer": {"seed": "0"},
+        "delivered: Input should be a finite number": {"delivered": math.nan},
+        "route: Value error, not pairs of finite numbers": {"route": [[1, 2], [3]]},
+        "route: Value error, not pairs": {"route": [[1e999, 0]]},
+        "more: Unexpected keyword argument": {"more": 1},
+    }
+    texts = {said: json.dumps(sound | changes).encode() for said, changes in changed.items()}
+    others = b'{"no": "row"}', b"[" * 100_000, b'{"key": "\xff"}', b"1", b"", b"9" * 10**6
+    for said, content in [*texts.items(), *(("", each) for each in others)]:
+        kept.write_bytes(content)
+        with pytest.raises(InputError, match=rf"{name}: no row of a study: {said}"):
             run_study(CASES, jobs=1, directory=tmp_path)
-    for line in (b'{"not": "a row"}', b"[" * 100_000, b'{"key": "\xff"}', b"1", b"", b"9" * 10**6):
-        rows.write_bytes(line + b"\n")
-        with pytest.raises(InputError, match="line 1: no row of a study"):
-            load_rows(tmp_path, CASES)
-    rows.write_text("notes without a line's end")
-    with pytest.raises(InputError, match="its last line is no row of a study"):
-        run_study(CASES, jobs=1, directory=tmp_path)
-    assert rows.read_text() == "notes without a line's end"
 
 
 def test_a_study_on_a_full_disk_keeps_whole_rows_and_goes_on(
     tmp_path: Path, whole: Whole, plan: Path
 ) -> None:
-    path = tmp_path / "out" / "rows.jsonl"
-    asked = (plan, "--power", "0,10", "--schemes", "faao,mrt", "--jobs", 1, "--out", path.parent)
-    first, second, third, _ = (whole[0] / "rows.jsonl").read_bytes().splitlines(keepends=True)
-    with files_of_at_most(len(first + second) + len(third) // 2):
-        result = run(*asked)
+    rows = tmp_path / "out" / "rows"
+    asked = (plan, "--schemes", "faao,mrt", "--jobs", 1, "--out", rows.parent, "--power")
+    assert run(*asked, "0").exit_code == 0
+    with files_of_at_most(100):  # a part of a row
+        result = run(*asked, "0,10")
     assert result.exit_code == 2
-    kept = path.read_bytes()
-    assert kept.endswith(b"}\n")
-    assert kept.count(b"\n") == 2
     (line,) = result.stderr.splitlines()
-    assert f"{path}: cannot be written: File too large; the rows before are kept" in line
-    path.write_bytes(kept + kept[:100])  # where nothing could be cut back
-    with files_of_at_most(len(first)):  # less than it has: the torn row is dropped all the same
-        assert len(load_rows(path.parent, CASES)) == 2
-    assert path.read_bytes() == kept
-    assert run(*asked).exit_code == 0
-    assert timeless(load_rows(path.parent, CASES)) == timeless(whole[1])
+    assert f"{rows}/{CASES[2].key}.json: cannot be written: File too large; the rows before" in line
+    assert {each.name for each in rows.iterdir()} == {f"{case.key}.json" for case in CASES[:2]}
+    assert run(*asked, "0,10").exit_code == 0
+    assert timeless(load_rows(rows.parent, CASES)) == timeless(whole[1])
 
 
 def test_rates_routes_and_causality_are_drawn(plan: Path, whole: Whole, tmp_path: Path) -> None:
@@ -283,9 +269,8 @@ def test_ctrl_c_leaves_a_directory_to_go_on_with(plan: Path, tmp_path: Path) -> 
     process = subprocess.Popen(
         [*map(str, command)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
-    rows = out / "rows.jsonl"
     deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline and not (rows.exists() and rows.read_bytes().count(b"\n")):
+    while time.monotonic() < deadline and not [*out.glob("rows/*.json")]:
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=PATIENCE)
