@@ -119,16 +119,22 @@ def check_extra(name: str, module: str, purpose: str) -> None:
 
 
 def quote(value: object) -> str:
-    """Return `value` as a message shows it, in one line, cut short.
+    """Return `value` as a message shows it, in the words of YAML, in one line, cut short.
 
-    >>> quote("slow"), quote(None), quote(True), quote([1, 2.5]), quote({})
-    ("'slow'", 'null', 'true', '[1, 2.5]', 'nothing')
+    >>> quote("slow"), quote(None), quote([True, 2.5]), quote({"least": 1}), quote({})
+    ("'slow'", 'null', '[true, 2.5]', '{least: 1}', 'nothing')
     """
-    if isinstance(value, bool):
-        return str(value).lower()
     if isinstance(value, dict | list) and not value:
         return "nothing"
-    return shortened("null" if value is None else repr(value))
+    if isinstance(value, dict):
+        shown = f"{{{', '.join(f'{key}: {quote(inside)}' for key, inside in value.items())}}}"
+    elif isinstance(value, list):
+        shown = f"[{', '.join(map(quote, value))}]"
+    elif isinstance(value, bool):
+        shown = str(value).lower()
+    else:
+        shown = "null" if value is None else repr(value)
+    return shortened(shown)
 
 
 def place_of(steps: Sequence[str | int]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from faao_mav.autopilot import autopilots
 from faao_mav.autopilot.files import parameter_path, plan_target
-from faao_mav.errors import FaaoError, InputError
+from faao_mav.errors import FaaoError, InputError, counted
 from faao_mav.files import check_writable, write_together
 from faao_mav.mission.formats import (
     check_replaceable,
@@ -81,7 +81,8 @@ class Result:
         made = str(self.no_mission or "no mission asked for")
         if self.conversion is not None:
             errors = sum(finding.level is Level.ERROR for finding in self.findings)
-            made = f"a mission of {len(self.conversion.mission.items)} items, {errors} errors"
+            items = counted(len(self.conversion.mission.items), "item")
+            made = f"a mission of {items}, {counted(errors, 'error')}"
         delivers = f"delivers {self.solution.delivered_rate:.4f} bit/s/Hz"
         return f"<Result of {self.solution.plan.name!r}: {delivers}, {made}>"
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import faao_mav.cli.shared as cli
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, counted
 from faao_mav.files import check_ending, read_text, write_together
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class _Measured:
         for rows in tables:
             found = read_measured(path, station, units, points, steps, rows)
             if found.left_out and not rows:
-                cli.note(f"{path}: {found.left_out} rows tell no level and are left out")
+                cli.note(f"{path}: left out: {counted(found.left_out, 'row')} without a level")
             over_noise = found.unit == "db"
             if over_noise and (self.power is None) != (self.noise is None):
                 raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")

@@ -4,12 +4,13 @@ import math
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from faao_mav.autopilot import vehicle_types
-from faao_mav.errors import quote
+from faao_mav.errors import counted, quote
 from faao_mav.files import table
 from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Problem, listed, wrong
@@ -113,6 +114,9 @@ def _rates(plan: PlanContents) -> Iterator[Problem]:
         yield wrong("rates-count", key=key, rates=len(values), ratios=len(rates.snr_db))
     if not any(values):
         yield wrong("rates-zero", key=key)
+    for (low, more), (high, less) in pairwise(sorted(zip(rates.snr_db, values, strict=False))):
+        if less < more:
+            yield wrong("rates-fall", key=key, low=low, more=more, high=high, less=less)
     for key, needed in (
         ("method", "direct"), ("precoder", "faao"), ("inputs", "alphabet"), ("rate", "cutoff")
     ):  # fmt: skip
@@ -162,7 +166,7 @@ def _steps(plan: PlanContents) -> Iterator[Problem]:
     if abs(ratio - round(ratio)) > 1e-6 * max(1.0, ratio):
         yield wrong("steps-whole", low=math.floor(ratio) * step, high=math.ceil(ratio) * step)
     if plan.flight.slots < FEWEST_SLOTS:
-        yield wrong("steps-few", least=FEWEST_SLOTS)
+        yield wrong("steps-few", steps=counted(plan.flight.slots, "step"), least=FEWEST_SLOTS)
 
 
 def _stations(plan: PlanContents) -> Iterator[Problem]:

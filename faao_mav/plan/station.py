@@ -17,8 +17,8 @@ from faao_mav.vector import Vector
 MAX_POINTS = 5_000
 """Points of the longest track; chosen: 80 minutes of one a second."""
 
-_FASTEST = 1000.0
-"""Greatest speed of a station, m/s; chosen, as for aircraft."""
+_FASTEST = 150.0
+"""Greatest speed of a station, m/s; chosen: no train, boat or relayed aircraft is as fast."""
 
 _LOCAL, _GLOBAL = ("time_s", "east_m", "north_m"), ("time_s", "latitude", "longitude")
 """The columns of a track."""
@@ -80,7 +80,7 @@ def _track(value: object, info: ValidationInfo) -> Track | None:
         raise told(str(error)) from None
     times, *sides = held.values()
     if not 2 <= len(times) <= MAX_POINTS:
-        raise told(f"{len(times):,} points with a time; give 2 to {MAX_POINTS:,}")
+        raise told(f"points with a time: {len(times):,}; give 2 to {MAX_POINTS:,}")
     before, places = -math.inf, []
     for number, (t, *place) in enumerate(zip(times, *sides, strict=True), 1):
         written = dict(zip(_GLOBAL[1:], place, strict=True)) if "latitude" in held else place
@@ -90,6 +90,8 @@ def _track(value: object, info: ValidationInfo) -> Track | None:
             raise told(f"point {number}: {error}") from None
         if not (math.isfinite(t) and t > before):
             raise told(f"point {number}: time {t:g} s; give finite times that rise")
+        if places[1:] and math.dist(*places[-2:]) > _FASTEST * (t - before):
+            raise told(f"point {number}: more than {_FASTEST:g} m/s from the point before")
         before = t
     return Track(tuple(t - times[0] for t in times), tuple(places))
 

@@ -235,7 +235,7 @@ def _goal(solution: Solution) -> Iterator[Line]:
     plan, goal = solution.plan, solution.plan.goal
     if (found := solution.least) is None:
         return
-    flights = f"{found.optimizations} flights optimised"
+    flights = f"{counted(found.optimizations, 'flight')} optimised"
     if goal.energy_wh is not None:
         told = f"most data within {goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
         yield "goal", f"{told}({found.limit:g} s given), {solution.energy_wh:.4g} Wh; {flights}"

@@ -209,7 +209,7 @@ def frontier_table(rows: Sequence[StudyRow], plan: Plan, key: str) -> str:
         f"{row.values[key]:12g}  {_data(row, plan.flight.time_step):20.4g}  {row.delivered:8.4f}"
         for row in pareto(rows, key)
     ]
-    return "\n".join([*lines, *failures(rows, "points")])
+    return "\n".join([*lines, *failures(rows, "point")])
 
 
 def frontier_figure(rows: Sequence[StudyRow], plan: Plan, key: str) -> "Figure":

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError, place_of
+from faao_mav.errors import InputError, counted, place_of
 from faao_mav.files import read_bytes, write_whole
 from faao_mav.study.sweep import StudyCase, Value
 
@@ -166,11 +166,11 @@ def spread(rates: Sequence[float]) -> float:
     return stdev(rates) if len(rates) > 1 else 0.0
 
 
-def failures(rows: Sequence[StudyRow], what: str = "rows") -> list[str]:
+def failures(rows: Sequence[StudyRow], what: str = "row") -> list[str]:
     """Return a line on how many of `rows` failed, and why the first did; none if none did."""
-    failed = [row for row in rows if row.error]
-    told = f"{len(failed)} of {len(rows)} {what} failed, first: "
-    return [told + failed[0].error] if failed else []
+    failed = [row.error for row in rows if row.error]
+    told = f"{len(failed)} of {counted(len(rows), what)} failed, first: "
+    return [told + failed[0]] if failed else []
 
 
 def comparison(rows: Sequence[StudyRow]) -> str:
@@ -181,7 +181,7 @@ def comparison(rows: Sequence[StudyRow]) -> str:
     text = [line for measure in ("R_avg", "delivered") for line in _compared(rows, measure)]
     text += failures(rows)
     if loose := sum(row.converged is False for row in rows):
-        text.append(f"{loose} of {len(rows)} rows did not converge")
+        text.append(f"{loose} of {counted(len(rows), 'row')} did not converge")
     return "\n".join(text)
 
 

@@ -176,7 +176,7 @@ def test_options_go_before_the_plans_study_and_a_failing_row_is_one(
     plan.write_text(edited(QUICK, {"radio.fading": "ergodic"}))
     result = run(plan, "--schemes", "algorithm1", "--jobs", 1)
     assert result.exit_code == 1
-    assert "1 of 1 rows failed" in result.stdout
+    assert "1 of 1 row failed" in result.stdout
     assert "ergodic" in result.stdout
 
 
