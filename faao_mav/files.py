@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from faao_mav.errors import InputError, quote
@@ -285,15 +286,12 @@ def table(name: str) -> tuple[Mapping[str, str], ...]:
     )
 
 
-class Numbers:
+class Numbers(SimpleNamespace):
     """Numbers, by their names."""
-
-    def __init__(self, values: Mapping[str, float]) -> None:
-        self.__dict__.update(values)
 
     if TYPE_CHECKING:
 
-        def __getattr__(self, name: str) -> float: ...
+        def __getattribute__(self, name: str, /) -> float: ...
 
 
 def numbers(name: str, **those: str) -> Numbers:
@@ -303,4 +301,4 @@ def numbers(name: str, **those: str) -> Numbers:
     1.0
     """
     rows = (row for row in table(name) if those.items() <= row.items())
-    return Numbers({row["name"]: float(row["value"]) for row in rows})
+    return Numbers(**{row["name"]: float(row["value"]) for row in rows})

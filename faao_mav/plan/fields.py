@@ -17,7 +17,7 @@ says it in words.
 import json
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Annotated, Any, TypeAlias, TypeVar, dataclass_transform
@@ -149,47 +149,25 @@ def check_degrees(latitude: float, longitude: float) -> None:
 
 def read_position(value: object, info: ValidationInfo) -> Vector:
     """Return the local metres of a position as a plan writes it; raise ValueError for others."""
-    if isinstance(value, dict):
-        context: Any = info.context
-        return _local(value, context.get("origin"))
-    east, north = read_pair(value, "[east, north] in metres")
-    if max(abs(east), abs(north)) > MAX_LOCAL_DISTANCE:
-        raise ValueError(f"farther than {MAX_LOCAL_DISTANCE / 1000:.0f} km from the origin")
-    return east, north
-
-
-def _local(value: Mapping[str, Any], origin: Vector | None) -> Vector:
-    """Return the metres about `origin` of {latitude, longitude}; zeros for a bad origin."""
+    if not isinstance(value, dict):
+        east, north = read_pair(value, "[east, north] in metres")
+        if max(abs(east), abs(north)) > MAX_LOCAL_DISTANCE:
+            raise ValueError(f"farther than {MAX_LOCAL_DISTANCE / 1000:.0f} km from the origin")
+        return east, north
     both = [value.get("latitude"), value.get("longitude")] if len(value) == 2 else None
     place = read_pair(both, "{latitude: degrees, longitude: degrees}")
     check_degrees(*place)
-    if origin is None:
+    context: Any = info.context
+    if (origin := context.get("origin")) is None:  # a bad one is told by itself
         return 0.0, 0.0
     east, north = map(float, LocalFrame(*origin).to_local(*place))
-    distance = math.hypot(east, north)
-    if distance <= MAX_LOCAL_DISTANCE:
+    if (distance := math.hypot(east, north)) <= MAX_LOCAL_DISTANCE:
         return east, north
     raise told(
         f"latitude {place[0]}, longitude {place[1]} lies {distance / 1000:,.0f} km from "
         f"site.origin ({origin[0]}, {origin[1]}), at most {MAX_LOCAL_DISTANCE / 1000:.0f} km is "
-        f"accepted{_slip(place, origin)}"
+        "accepted; are the two swapped, or a sign forgotten: south and west are negative"
     )
-
-
-def _slip(place: Vector, origin: Vector) -> str:
-    """Return what slip of the pen would explain a position far from the origin."""
-    (lat, lon), (home_lat, home_lon) = place, origin
-
-    def close(a: Vector, b: Vector) -> bool:
-        if max(abs(a[0]), abs(b[0])) > 90:
-            return False
-        return math.hypot(*LocalFrame(*a).to_local(*b)) <= MAX_LOCAL_DISTANCE
-
-    if close(origin, (lon, lat)) or close((home_lon, home_lat), place):
-        return "; latitude and longitude look swapped in one of the two"
-    if any(close(origin, pair) for pair in ((-lat, lon), (lat, -lon), (-lat, -lon))):
-        return "; a sign differs: south and west are negative"
-    return ""
 
 
 def _velocity(value: object) -> Vector | None:

@@ -135,6 +135,7 @@ def _headline(result: Result) -> str:
 def _wrong(result: Result) -> str:
     found = {finding.level for finding in result.findings} - {Level.NOTE}
     counts = [count_of(result.findings, level) for level in Level if level in found]
+    counts += [] if result.solution.converged else ["the search has NOT CONVERGED"]
     return ", ".join(counts) or "no errors or warnings"
 
 

@@ -87,7 +87,7 @@ def assemble(route: Route, plan: Plan) -> Mission:
     rows = len(items) + 1
     if rows > plan.mission.max_items:
         raise InfeasibleError(
-            f"the mission needs {rows} items with home, mission.max_items is "
+            f"{plan.source}: the mission needs {rows} items with home, mission.max_items is "
             f"{plan.mission.max_items}; raise mission.max_items (if the autopilot stores as many) "
             f"or mission.path_tolerance (now {plan.mission.path_tolerance:g} m)"
         )
@@ -182,7 +182,8 @@ def check_run_in(plan: Plan, route: Route) -> None:
         leg = route.positions[begin : end + 1]
         if len(leg) > 1 and not area.covers_path(leg):
             raise InfeasibleError(
-                f"{edge_of(plan)}: the aircraft takes {route.leg_lengths[begin]:.0f} m to get up "
+                f"{plan.source}: {edge_of(plan)}: the aircraft takes "
+                f"{route.leg_lengths[begin]:.0f} m to get up "
                 f"to speed before flight.start, or to slow down after flight.end, and at "
                 f"flight.{name} that leg comes nearer to the edge than {plan.margin:g} m "
                 f"({margin_key(plan)}): give flight.{name}_velocity: hover, or move flight.{name}"
