@@ -145,10 +145,6 @@ class RotaryWing:
         none = np.zeros((2, *v.shape))
         return PowerPartials(self.level(speed), 2 * first * v, 0 * v, by_vv, 0 * by_vv, none)
 
-    def least_power(self, speeds: Real) -> tuple[float, float]:
-        """Return the one of the `speeds` of least power in level flight, m/s, and that, W."""
-        return _least(speeds, self.level(speeds))
-
 
 @dataclass(frozen=True, slots=True)
 class FixedWing:
@@ -167,7 +163,7 @@ class FixedWing:
         """Return the model of least energy per metre at `speed`, where it takes `cruise`, W."""
         return cls(cruise / (2 * speed**3), cruise * speed / 2, mass)
 
-    def level(self, speed: Real, across: Real) -> Real:
+    def level(self, speed: Real, across: Real | float = 0.0) -> Real:
         """Return P(v, a), W, at airspeeds and accelerations across them, m/s, m/s^2."""
         lift = self.c2 / np.maximum(speed, _LEAST_AIRSPEED)
         return np.asarray(self.c1 * speed**3 + lift * (1 + (across / GRAVITY) ** 2))
@@ -209,15 +205,13 @@ class FixedWing:
         value = self.level(speed, across / speed) + self.mass * (gained + root) / 2
         return PowerPartials(value, by_v, by_a, by_vv, by_aa, by_va)
 
-    def least_power(self, speeds: Real) -> tuple[float, float]:
-        """Return the one of the `speeds` of least power in straight and level flight, and that."""
-        return _least(speeds, self.level(speeds, np.zeros_like(speeds)))
-
 
 PowerModel: TypeAlias = RotaryWing | FixedWing
 """What tells the power, W, that a flight takes: of a rotary wing or of a fixed one."""
 
 
-def _least(speeds: Real, powers: Real) -> tuple[float, float]:
+def least_power(model: PowerModel, speeds: Real) -> tuple[float, float]:
+    """Return the one of the `speeds`, m/s, of least power in straight level flight, and that, W."""
+    powers = model.level(speeds)
     least = int(powers.argmin())
     return float(speeds[least]), float(powers[least])

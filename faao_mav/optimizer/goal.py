@@ -29,7 +29,7 @@ from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import MIN_DBM, dbm
 from faao_mav.plan.keys import ALIASES, POWER
-from faao_mav.power import JOULES_PER_WH
+from faao_mav.power import JOULES_PER_WH, least_power
 
 POWER_STEP = 0.01
 """The step of the least power, dB. Chosen: radios are set to tenths."""
@@ -208,7 +208,7 @@ class _Flights:
         fastest = self.plan.max_ground_speed + math.hypot(*self.plan.wind)
         airspeeds = np.linspace(self.plan.vehicle.min_speed, fastest, 10 * _COMPARED)
         assert self.plan.power_model is not None  # goals of an energy have one
-        least = self.plan.power_model.least_power(airspeeds)[1] + self.plan.radio.relay.power
+        least = least_power(self.plan.power_model, airspeeds)[1] + self.plan.radio.relay.power
         high = min(high, int(energy / (least * step)))
         if (near := self.last.problem.energy) < math.inf:
             centre = len(self.last.w) * energy / near

@@ -123,6 +123,7 @@ def _headline(result: Result) -> str:
     told = f"delivers {rate:.4f} bit/s/Hz for {lasting}"
     if megabytes is not None:
         told = f"delivers {megabytes:.4g} megabytes in {lasting} ({megabits:.4g} Mbit/s)"
+    told += "" if solution.converged else " (NOT CONVERGED)"
     told = f"{plan.name}: {told}" if plan.name else told
     if result.no_mission is not None:
         return f"{told}; there is no mission for it"
@@ -135,7 +136,6 @@ def _headline(result: Result) -> str:
 def _wrong(result: Result) -> str:
     found = {finding.level for finding in result.findings} - {Level.NOTE}
     counts = [count_of(result.findings, level) for level in Level if level in found]
-    counts += [] if result.solution.converged else ["the search has NOT CONVERGED"]
     return ", ".join(counts) or "no errors or warnings"
 
 

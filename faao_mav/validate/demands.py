@@ -10,7 +10,7 @@ from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.plan import Plan, Radio, Vector
 from faao_mav.plan.vehicle import Battery
-from faao_mav.power import JOULES_PER_WH
+from faao_mav.power import JOULES_PER_WH, least_power
 
 ELSEWHERE = 2_000.0
 """Metres that a mission comes no nearer to the planned path if it is of another place. Chosen."""
@@ -173,5 +173,5 @@ def energy_use(
     power = model(air, np.gradient(air, t, axis=0)) + relay
     steps = np.diff(t) * (power[1:] + power[:-1]) / 2
     used = np.concatenate([[0.0], np.cumsum(steps)]) / JOULES_PER_WH
-    least = model.least_power(_AIRSPEEDS)[1] + relay
+    least = least_power(model, _AIRSPEEDS)[1] + relay
     return EnergyUse(t, power, used, plan.vehicle.battery, lands, least)

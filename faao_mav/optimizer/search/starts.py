@@ -22,6 +22,7 @@ from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.kinematics import Kinematics, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.search.straight import cruise_by, straight_flight, with_stops
+from faao_mav.power import least_power
 
 BY_STATIONS = ("straight", "bs", "user", "bs-user", "user-bs")
 """What `global` stands for: paths found over the map gained nothing beside these (44 random plans,
@@ -194,7 +195,7 @@ def sparing_starts(
     before and after.
     """
     (limit,) = (each for each in kept if isinstance(each, EnergyLimit))
-    speed, _ = limit.model.least_power(kin.max_speed * _PLACES[1:])
+    speed, _ = least_power(limit.model, kin.max_speed * _PLACES[1:])
     rate = _TURN_SHARE * kin.turning(speed) / speed
     found = {}
     for side, (name, route) in zip(cycle((1, -1)), routes.items(), strict=False):
