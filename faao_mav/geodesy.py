@@ -53,7 +53,7 @@ class LocalFrame:
         Longitudes are in [-180, 180). Positions beyond the antipode (20 000 km) give infinities.
         """
         east, north = np.moveaxis(np.asarray(positions, dtype=float), -1, 0)
-        longitude, latitude = self._projection(east, north, inverse=True)
+        longitude, latitude = _projection(self)(east, north, inverse=True)
         inside = (longitude >= -180) & (longitude < 180)  # which keep their bits
         wrapped = np.where(inside, longitude, np.mod(longitude + 180, 360) - 180)
         return np.asarray(latitude), np.where(wrapped >= 180, -180.0, wrapped)
@@ -63,17 +63,13 @@ class LocalFrame:
         lat, lon = np.broadcast_arrays(
             np.asarray(latitude, dtype=float), np.asarray(longitude, dtype=float)
         )
-        east, north = self._projection(lon, lat)
+        east, north = _projection(self)(lon, lat)
         return np.stack([np.asarray(east), np.asarray(north)], axis=-1)
-
-    @property
-    def _projection(self) -> "Proj":
-        return _projection(self.latitude, self.longitude, self.radius)
 
 
 @lru_cache(maxsize=32)
-def _projection(latitude: float, longitude: float, radius: float | None) -> "Proj":
+def _projection(frame: LocalFrame) -> "Proj":
     from pyproj import Proj  # costs more to import than a whole conversion takes
 
-    earth = {"datum": "WGS84"} if radius is None else {"R": radius}
-    return Proj(proj="aeqd", lat_0=latitude, lon_0=longitude, units="m", **earth)
+    earth = {"datum": "WGS84"} if frame.radius is None else {"R": frame.radius}
+    return Proj(proj="aeqd", lat_0=frame.latitude, lon_0=frame.longitude, units="m", **earth)

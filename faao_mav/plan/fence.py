@@ -128,23 +128,18 @@ def trouble(plan: PlanContents, place: Vector) -> str:
     """Return where a `place`, m, is that `keep_in` of `plan` leaves out, or near its edge."""
     import shapely
 
-    area = plan.keep_in
+    area, point = plan.keep_in, shapely.Point(place)
     assert area is not None
-    point, margin = shapely.Point(place), plan.margin
-    clearance = area.clearance(np.array([place]))
-    for part in (*plan.zones, *plan.ground):
-        if not part.inclusion and part.shape.distance(point) < margin:
-            depth = part.shape.boundary.distance(point)
-            whose = "under the map" if part in plan.ground else "of the fence"
-            if part.shape.contains(point):
-                return f"{depth:.1f} m inside {part.name} {whose}; move it out"
-            return _near(plan, depth, part.name)
-    if clearance < 0:
-        return f"{-clearance:.1f} m outside the inclusions of the fence; move it inside"
-    return _near(plan, clearance, f"the edge of the {edge_of(plan)}")
-
-
-def _near(plan: PlanContents, distance: float, what: str) -> str:
+    distance, what = area.clearance(np.array([place])), f"the edge of the {edge_of(plan)}"
+    out = [each for each in (*plan.zones, *plan.ground) if not each.inclusion]
+    near = [each for each in out if each.shape.distance(point) < plan.margin]
+    if near:
+        distance, what = near[0].shape.boundary.distance(point), near[0].name
+        if near[0].shape.contains(point):
+            whose = "under the map" if near[0] in plan.ground else "of the fence"
+            return f"{distance:.1f} m inside {what} {whose}; move it out"
+    elif distance < 0:
+        return f"{-distance:.1f} m outside the inclusions of the fence; move it inside"
     return (
         f"{distance:.1f} m from {what}, less than {margin_key(plan)} ({plan.margin:g} m); "
         "move it, or give a smaller margin"

@@ -23,9 +23,6 @@ _FASTEST = 150.0
 _LOCAL, _GLOBAL = ("time_s", "east_m", "north_m"), ("time_s", "latitude", "longitude")
 """The columns of a track."""
 
-_SAME = 1.0
-"""Metres that `position` may be from the first place of `track`. Chosen."""
-
 
 class Track(NamedTuple):
     """A way with times: at `times`, s after the first, at `places` [east, north], m.
@@ -101,14 +98,11 @@ def _place(value: object, info: ValidationInfo) -> Vector:
     if "track" not in info.data:  # it is refused itself
         return 0.0, 0.0
     track: Track | None = info.data["track"]
-    if value is None:
-        if track is None:
-            raise PydanticCustomError("missing", "missing")
-        return track.places[0]
-    place = read_position(value, info)
-    if track is not None and (away := math.dist(place, track.places[0])) > _SAME:
-        raise told(f"{away:.4g} m from the first place of track; leave position out")
-    return place
+    if track is None and value is None:
+        raise PydanticCustomError("missing", "missing")
+    if track is not None and value is not None:
+        raise told(f"{quote(value)}: track is given too; leave one out")
+    return read_position(value, info) if track is None else track.places[0]
 
 
 _OF_TRACK: Any = None
