@@ -82,6 +82,9 @@ def test_the_least_power_is_just_enough() -> None:
     assert lines[0][0] == "goal"
     assert lines[0][1].startswith(f"least power for {share * full:.4f} bit/s/Hz: {powers} (1 dBm ")
     assert lines[1] == ("", f"{less} would deliver {below.delivered_rate:.4f} bit/s/Hz")
+    plan = found.plan.changed({"radio.gain.spread_db": 6})
+    _, text = next(result_lines(Result(replace(found, problem=replace(found.problem, plan=plan)))))
+    assert f"{share * full:.4f} bit/s/Hz without shadowing: {powers}" in text
     told = Result(found).as_dict()["goal"]
     assert told["power_dbm"] == pytest.approx([dbm(base), dbm(relay)])
     assert told["one_step_less"]["delivered_rate"] == below.delivered_rate
