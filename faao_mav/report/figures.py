@@ -213,9 +213,10 @@ def _speed(solution: Solution, conversion: Conversion | None) -> _Plot:
         over = solution.t[-1] + max(0.0, schedule.late)
         inside = (t >= solution.t[0]) & (t <= over)
         curves["predicted"] = t[inside], lengths(track["predicted_v"])[inside]
-    limits = {"v_max": vehicle.max_speed}
+    air = " through the air" if any(solution.plan.wind) else ""
+    limits = {"v_max" + (air if vehicle.type == "plane" else ""): vehicle.max_speed}
     if vehicle.min_speed > 0:
-        limits["v_min"] = vehicle.min_speed
+        limits["v_min" + air] = vehicle.min_speed
     return _Plot("speed, m/s", curves, limits)
 
 
@@ -254,9 +255,10 @@ def _draw(column: "list[Axes]", *plots: _Plot) -> None:
             (line,) = axes.plot(t, values, color=colour, label=name)
             if len(plot.curves) > 1:
                 line.set(linewidth=1.1 if k else 3.6, alpha=None if k else 0.45)
-        axes.set_ylim(bottom=min(0.0, axes.dataLim.y0))
         last = axes is column[-1]
         label(axes, "", "time, s" if last else "", plot.what)
         axes.tick_params(labelbottom=last)
         if ("" not in plot.curves or plot.limits) and len(plot.curves) <= len(SERIES):
             legend_above(axes)
+    for axes in column:  # when all are drawn: it ends the scaling of axes that are shared
+        axes.set_ylim(bottom=min(0.0, axes.dataLim.y0))

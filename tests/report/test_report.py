@@ -69,13 +69,16 @@ def lines(axes: Any) -> dict[str, Any]:
 
 
 def test_axes_are_named_with_units_and_legends_hide_no_curve() -> None:
-    for figure in (whole(), *of_page(flown()).values()):
+    solution = flown().solution
+    weaker = Result(replace(solution, I_U=solution.I_U / 2))  # the hop that is drawn first
+    for figure in (whole(), *of_page(flown()).values(), *of_page(weaker).values()):
         figure.draw_without_rendering()
         plots = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
         for axes in set(figure.axes) - set(plots):
             assert axes.get_ylabel() == "planned speed, m/s"
         for axes in plots:
             assert ", " in axes.get_ylabel()
+            assert axes.get_ylim()[1] >= axes.dataLim.y1
             lowest = not any(
                 axes is not other and axes.get_shared_x_axes().joined(axes, other)
                 and other.get_position().y0 < axes.get_position().y0
