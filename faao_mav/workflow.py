@@ -29,7 +29,7 @@ from faao_mav.optimizer.pricing import (
     saturation,
 )
 from faao_mav.optimizer.problem import OwnParts
-from faao_mav.optimizer.shadowing import Shadowed, shadowed
+from faao_mav.optimizer.shadowing import Shadowed, shadowed, worth
 from faao_mav.optimizer.solution import Observer, Progress, Rates, Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
@@ -226,8 +226,8 @@ def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
         "limit": least.limit,
         "one_step_less": below
         and {
-            "delivered_rate": below.delivered_rate,
-            "delivered_mbytes": below.plan.megabytes(below.delivered_rate),
+            "delivered_rate": worth(below),
+            "delivered_mbytes": below.plan.megabytes(worth(below)),
         },
         "optimizations": least.optimizations,
     }

@@ -24,6 +24,7 @@ from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.direct import direct
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.straight import straight_flight
+from faao_mav.optimizer.shadowing import worth
 from faao_mav.optimizer.solution import Least, Observer, Solution, staged
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
@@ -154,7 +155,7 @@ class _Flights:
     def data(self, found: Solution, less: float = 0.0) -> float:
         """Return what `found` delivers above a rate, bit/Hz per slot; where one is asked for it."""
         slots = len(found.w) if self.plan.goal.rate is None else 1
-        return (found.delivered_rate - less) * slots
+        return (worth(found) - less) * slots
 
     def surplus(self, found: Solution) -> float:
         """Return by how much that is above what is asked for."""
@@ -265,7 +266,7 @@ def thriftiest_straight(plan: Plan) -> tuple[float, float]:
 
 
 def _out_of_reach(plan: Plan, best: Solution) -> str:
-    goal, R_del = plan.goal, best.delivered_rate
+    goal, R_del = plan.goal, worth(best)
     if goal.deliver_mbytes is not None:
         asked = f"goal.deliver_mbytes: {goal.deliver_mbytes:g} megabytes cannot be delivered"
         most = f"{plan.megabytes(R_del):.4g} megabytes"

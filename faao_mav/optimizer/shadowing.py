@@ -131,6 +131,12 @@ def shadowed(solution: Solution) -> Shadowed | None:
     )
 
 
+def worth(solution: Solution) -> float:
+    """Return what a goal counts of a solution, bit/s/Hz: `Shadowed.worth`, or what is delivered."""
+    under = shadowed(solution)
+    return solution.delivered_rate if under is None else under.worth
+
+
 def under_shadowing(problem: Problem, w: Real, rates: Rates) -> Shadowed:
     """Return what arrives at w (n, 2); see `outcomes`."""
     found, reliability = outcomes(problem, w, rates), problem.plan.radio.reliability

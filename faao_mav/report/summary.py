@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from faao_mav.errors import counted
+from faao_mav.optimizer.shadowing import worth
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
@@ -237,20 +238,24 @@ def _goal(solution: Solution) -> Iterator[Line]:
     if (found := solution.least) is None:
         return
     flights = f"{counted(found.optimizations, 'flight')} optimised"
-    calm = " without shadowing" if any(plan.radio.spreads) else ""
+    share, under = plan.radio.reliability, ""
+    if any(plan.radio.spreads):
+        under = f" in {share:g} of shadowings" if share else " in the mean over shadowings"
     if goal.energy_wh is not None:
-        told = f"most data{calm} within {goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
+        told = f"most data{under} within {goal.energy_wh:g} Wh: {plan.flight.duration:g} s "
         yield "goal", f"{told}({found.limit:g} s given), {solution.energy_wh:.4g} Wh; {flights}"
         return
     energy = goal.minimise == "energy"
     unit = "dBm given" if goal.minimise == "power" else "s given"
     limit = f"{found.limit:.4g} Wh without that goal" if energy else f"{found.limit:g} {unit}"
-    told = f"least {goal.minimise} for {_asked(plan, plan.needed_rate)}{calm}: {_brought(solution)}"
+    told = (
+        f"least {goal.minimise} for {_asked(plan, plan.needed_rate)}{under}: {_brought(solution)}"
+    )
     yield "goal", f"{told} ({limit}); {flights}"
     if (below := found.below) is None:
         yield "", f"no flight takes less {'energy' if energy else 'time'}"
     else:
-        delivered = _asked(below.plan, below.delivered_rate)
+        delivered = _asked(below.plan, worth(below))
         yield "", f"{_brought(below)} would deliver {delivered}"
 
 
