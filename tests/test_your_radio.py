@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -255,6 +256,13 @@ def test_a_law_and_a_precoder_of_ones_own_are_as_the_plans() -> None:
         optimize(sample(), precoder=lambda H, W, noise: 2 * SCHEMES["mrt"](H, W, noise))
     with pytest.raises(InputError, match="expected finite numbers"):
         optimize(sample(), precoder=lambda H, *_: H[..., :1])
+    endless = Shannon()
+    endless.most = math.nan
+    loud = Same(PathGain(1e5))
+    wrong: dict[str, Any] = {"gains": loud, "gain: log": loud, "rate: value": endless}
+    for name, part in wrong.items():
+        with pytest.raises(InputError, match=f"^{name}: "):
+            optimize(sample(), **{name.split(":")[0]: part})
     law, height = PathGain(1e-5, 2.4, (5.0, -30.0, 12.0)), 30.0
     away = np.random.default_rng(0).uniform(-300, 300, (2, 40))
     own, plans = (GainField(each, np.zeros(2), height) for each in (Same(law), law))

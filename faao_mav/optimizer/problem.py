@@ -9,7 +9,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 
 from faao_mav.arrays import Complex, Real
-from faao_mav.errors import PlanError
+from faao_mav.errors import InputError, PlanError, quote
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import Link, OwnPrecoder
 from faao_mav.optimizer.fence_geometry import FenceGeometry, fence_geometry
@@ -42,6 +42,10 @@ Chosen: some ten minutes with QPSK on six antennas, 32 draws and 240 slots."""
 _TABLE, _SEARCH = 1000, 2500
 """Sums for each draw in the table of a link's rate, and for each slot whose draw is known: about as
 many as there are."""
+
+_PROBES, _ROUNDED = 99, 1 + 1e-9
+"""Distances at which gains and rates of one's own are looked at, and by what rounding may raise
+these. Chosen."""
 
 
 @dataclass(frozen=True)
@@ -274,7 +278,30 @@ def build_problem(plan: Plan, **parts: Unpack[OwnParts]) -> Problem:
             )
         )
     bs_uav, uav_user = links
-    return Problem(plan, kinematics(plan), bs_uav, uav_user, precoder=parts.get("precoder"))
+    problem = Problem(plan, kinematics(plan), bs_uav, uav_user, precoder=parts.get("precoder"))
+    _check_parts(problem, parts)
+    return problem
+
+
+def _check_parts(problem: Problem, parts: OwnParts) -> None:
+    """Raise `InputError` for unknown parts, and for impossible gains and rates within reach."""
+    if unknown := ", ".join(sorted(parts.keys() - OwnParts.__annotations__.keys())):
+        raise InputError(f"{unknown}: no such part; give gain, rate or precoder")
+    for link in problem.links:
+        H, law, rate = link.gains.height, link.gains.law, parts.get("rate")
+        squared = np.linspace(0.0, problem.farthest(link), _PROBES) ** 2 + H**2
+        gain, told = law.log(squared, H), list[tuple[str, Real, float, float]]()
+        if "gain" in parts:
+            told.append(("gain: log", gain, -math.inf, 0.0))
+        if rate is not None:
+            snr = link.power * link.receive * link.transmit / link.noise * np.exp(gain)
+            told.append(("rate: value", rate.value(snr), 0.0, rate.most))
+        for name, found, least, most in told:
+            real = np.shape(found) == squared.shape and np.isrealobj(found)
+            sound = real and np.isfinite(found) & (found >= least) & (found <= most * _ROUNDED)
+            if not np.all(sound):
+                expected = f"expected numbers from {least:g} to {most:g}, one for each distance"
+                raise InputError(f"{name}: {expected} within reach; it gives {quote(found)}")
 
 
 def _check_size(plan: Plan) -> None:

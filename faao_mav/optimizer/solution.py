@@ -253,7 +253,7 @@ class Solution:
 
         Metres, m/s, m/s²; `fence` is by how much the continuous path misses the margin; the power
         limits (13b), (13c) relative to W, and `energy` to its limit; the fading relative to what
-        the plan's seed draws at w; the rates in bit/s/Hz. 0 where a constraint holds.
+        the plan's seed draws at w; the rates of the slots in bits. 0 where a constraint holds.
         """
         problem, clearance = self.problem, self.clearance()
         found = problem.kinematics.residuals(self.trajectory)
@@ -266,7 +266,8 @@ class Solution:
             used = float(np.sum(np.abs(P) ** 2, axis=(-2, -1)).max())
             found[powers[hop]] = max(0.0, used / link.power - 1)
             found[f"({hop + 1}) fading"] = float(np.abs(H_r - link.small_scale(self.w)).max())
-        found["(9) rate"] = abs(self.recomputed().R_avg - self.rates.R_avg)
+        told = np.array([self.I_U, self.I_G])
+        found["(9) rate"] = float(np.abs(np.array(self.recomputed_slots()) - told).max())
         return found
 
     def is_feasible(self, tolerance: float = 1e-6) -> bool:
@@ -370,6 +371,9 @@ def load_solution(path: str | Path) -> Solution:
         raise InputError(f"{path}: starts: {said}; expected rates by start") from None
     arrays: dict[str, Any] = {name: found[name] for name in _ARRAYS}
     problem = build_problem(plan)
+    slots = plan.flight.time_step * np.arange(plan.flight.slots)
+    if not np.allclose(arrays["t"], slots, rtol=0, atol=1e-6):
+        raise InputError(f"{path}: t: expected the times of the slots of the plan in the file")
     for name, link in (("P_B", problem.bs_uav), ("P_U", problem.uav_user)):
         check_power(arrays[name], link.power, f"{path}: {name}")
     return Solution(
