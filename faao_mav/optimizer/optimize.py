@@ -16,7 +16,7 @@ import numpy as np
 from faao_mav.errors import InfeasibleError, InputError, PlanError
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import OwnParts, build_problem
-from faao_mav.optimizer.shadowing import shadowed
+from faao_mav.optimizer.shadowing import shadowed, worth
 from faao_mav.optimizer.solution import BestHeight, Observer, Solution, staged
 from faao_mav.plan import Plan
 from faao_mav.plan.fields import dbm
@@ -27,6 +27,10 @@ _EVENLY = 9
 
 _DECIMALS = 1
 """Decimals of a height, m: missions and aircraft keep no finer one. Chosen."""
+
+_TIE = 1e-3
+"""What a rate as large as the one asked for counts, in steps of the duration. Chosen: it is to
+decide between equal ones alone."""
 
 Solve = Callable[[Plan, Trajectory | None], Solution]
 """How a plan of one height is solved, from the flight of a plan nearby where there is one."""
@@ -93,7 +97,7 @@ def best_height(plan: Plan, solve: Solve) -> Solution:
     solved: dict[float, Solution] = {}
     refused: dict[float, Exception] = {}
 
-    def worth(height: float) -> float:
+    def found_at(height: float) -> float:
         at = round(float(height), _DECIMALS)
         if at not in solved and at not in refused:
             near = min(solved, key=lambda other: abs(other - at), default=None)
@@ -105,7 +109,7 @@ def best_height(plan: Plan, solve: Solve) -> Solution:
         return _worth(solved[at]) if at in solved else -math.inf
 
     grid = np.linspace(low, high, _EVENLY)
-    values = np.array([-math.inf, *map(worth, grid), -math.inf])
+    values = np.array([-math.inf, *map(found_at, grid), -math.inf])
     if not solved:
         raise next(iter(refused.values()))
     inner = values[1:-1]
@@ -114,7 +118,7 @@ def best_height(plan: Plan, solve: Solve) -> Solution:
     for k in peaks.tolist():
         about = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
         minimize_scalar(
-            lambda height: -max(worth(height), least),
+            lambda height: -max(found_at(height), least),
             bounds=about,
             method="bounded",
             options={"xatol": 10.0**-_DECIMALS},
@@ -141,15 +145,16 @@ def _worth(solution: Solution) -> float:
     """Return what a plan is for, the more the better: a rate, what arrives, or less of its goal."""
     plan, goal = solution.plan, solution.plan.goal
     match goal.minimise:
-        case "duration":
-            return -plan.flight.duration
+        case "duration":  # of equal ones that which delivers most
+            more = worth(solution) / plan.needed_rate
+            return _TIE * plan.flight.time_step * more - plan.flight.duration
         case "power":
             return -dbm(plan.powers[0])
         case "energy":
             assert solution.energy_wh is not None
             return -solution.energy_wh
     if goal.maximise == "data":
-        return solution.delivered_rate * plan.flight.duration
+        return worth(solution) * plan.flight.duration
     if (under := shadowed(solution)) is not None:
         return under.worth
     return solution.maximised
