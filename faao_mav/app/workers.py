@@ -92,11 +92,11 @@ class Workers:
 
     def stop(self) -> None:
         """End all processes, whatever they do; those of others, as of joblib, go on."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
         for process in multiprocessing.active_children():
             if isinstance(process, self._context.Process):
                 process.kill()
+        if self._pool is not None:  # its thread too, which would else end with the interpreter
+            self._pool.shutdown(cancel_futures=True)
 
 
 async def talk(
