@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, cast
@@ -91,7 +91,7 @@ FORESEEN: dict[str, Track] = {}
 
 def foreseen(mission: Mission, vehicle: Vehicle, **how: Any) -> Track:
     """Return the predicted flight, which many scenes have in common."""
-    key = repr((mission, vehicle, how))
+    key = repr((astuple(mission), vehicle, how))
     FORESEEN[key] = FORESEEN.get(key) or predict(mission, vehicle, **how)
     return FORESEEN[key]
 
