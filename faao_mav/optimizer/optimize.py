@@ -29,8 +29,8 @@ _DECIMALS = 1
 """Decimals of a height, m: missions and aircraft keep no finer one. Chosen."""
 
 _TIE = 1e-3
-"""What a rate as large as the one asked for counts, in steps of the duration. Chosen: it is to
-decide between equal ones alone."""
+"""What the share of a rate that was asked for counts, in steps of the duration: it decides between
+equal ones alone. Chosen."""
 
 Solve = Callable[[Plan, Trajectory | None], Solution]
 """How a plan of one height is solved, from the flight of a plan nearby where there is one."""
@@ -146,8 +146,8 @@ def _worth(solution: Solution) -> float:
     plan, goal = solution.plan, solution.plan.goal
     match goal.minimise:
         case "duration":  # of equal ones that which delivers most
-            more = worth(solution) / plan.needed_rate
-            return _TIE * plan.flight.time_step * more - plan.flight.duration
+            asked = plan.needed_rate / worth(solution)
+            return -plan.flight.duration - _TIE * plan.flight.time_step * asked
         case "power":
             return -dbm(plan.powers[0])
         case "energy":
