@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -204,7 +205,7 @@ class _Flights:
         if energy >= self.taken:
             return self.whole
         assert self.last is not None
-        step, tried = self.plan.flight.time_step, dict[int, Solution]()
+        step, tried = self.plan.flight.time_step, dict[int, tuple[float, Solution]]()
         low, high = fewest_slots(self.plan), self.plan.flight.slots
         fastest = self.plan.max_ground_speed + math.hypot(*self.plan.wind)
         airspeeds = np.linspace(self.plan.vehicle.min_speed, fastest, 10 * _COMPARED)
@@ -220,9 +221,10 @@ class _Flights:
             n = round(slots)
             if n not in tried:
                 with suppress(InfeasibleError):
-                    tried[n] = self.lasting(n, energy, alone=True)
-                    self.last = max(tried.values(), key=self.data)
-            return -self.data(tried[n]) if n in tried else 0.0
+                    found = self.lasting(n, energy, alone=True)
+                    tried[n] = self.data(found), found
+                    _, self.last = max(tried.values(), key=itemgetter(0))
+            return -tried[n][0] if n in tried else 0.0
 
         if high >= low:
             within = max(0.5, _PRECISION * high)
