@@ -12,7 +12,8 @@ from hypothesis import given
 
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.fence_geometry import ConvexObstacles, FenceGeometry
-from faao_mav.optimizer.kinematics import Kinematics
+from faao_mav.optimizer.interior.limits import fence_constraints
+from faao_mav.optimizer.kinematics import LENGTH, Kinematics
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.starts import starts
@@ -59,12 +60,16 @@ def test_clearance_is_that_of_the_continuous_path(
     kin = Kinematics(np.array(way[0]), np.array(way[-1]), n, 1.0, speed, speed, None, None, True)
     flight = kin.follow(np.array(way) * 0.3)
     corners = shapely.get_coordinates(shapely.orient_polygons(outline))[:-1]
-    fence = FenceGeometry(ConvexObstacles.of([(corners, 0.0)]), np.empty((0, 2)), np.empty(0), 5.0)
+    east, obstacles = np.array([[1.0, 0.0]]), ConvexObstacles.of([(corners, 0.0)])
+    fence = FenceGeometry(obstacles, east, np.array([20.0]), 5.0)
     path = dense_path(flight.w, flight.v, flight.a, 1.0, 200)
-    told, true = fence.clearance(flight, 1.0), shapely.LineString(path).distance(outline)
+    told = fence.clearance(flight, 1.0)
+    true = min(shapely.LineString(path).distance(outline), 20 - path[:, 0].max())
     assert told <= true + 1e-6
     if true == 0:
         assert told <= 0
+    for constraint in fence_constraints(fence, kin):
+        assert LENGTH * constraint.excess(kin, flight) == pytest.approx(max(0, 5 - told))
 
 
 QUICK = {
