@@ -119,17 +119,20 @@ def check_extra(name: str, module: str, purpose: str) -> None:
 
 
 def quote(value: object) -> str:
-    """Return `value` as a message shows it, in the words of YAML, in one line, cut short.
+    r"""Return `value` as a message shows it, in the words of YAML, in one line, cut short.
 
     >>> quote("slow"), quote(None), quote([True, 2.5]), quote({"least": 1}), quote({})
     ("'slow'", 'null', '[true, 2.5]', '{least: 1}', 'nothing')
+    >>> print(quote({"a\nb": 1}))
+    {a\nb: 1}
     """
     if isinstance(value, dict | list) and not value:
         return "nothing"
     if isinstance(value, dict):
-        shown = f"{{{', '.join(f'{key}: {quote(inside)}' for key, inside in value.items())}}}"
+        keys = {key: printable(shortened(str(key))) for key in [*value][:_MAX_SHOWN]}
+        shown = f"{{{', '.join(f'{keys[key]}: {quote(value[key])}' for key in keys)}}}"
     elif isinstance(value, list):
-        shown = f"[{', '.join(map(quote, value))}]"
+        shown = f"[{', '.join(map(quote, value[:_MAX_SHOWN]))}]"
     elif isinstance(value, bool):
         shown = str(value).lower()
     else:

@@ -70,8 +70,8 @@ def test_logs_of_every_kind_give_the_law_that_was_flown(tmp_path: Path) -> None:
         path.write_bytes(written[path.name])
     out, page = tmp_path / "link.yaml", tmp_path / "link.html"
     told = json.loads(
-        link(*logs, "--station", PLACE, "--unit", "rssi=sik", "--power", 20, "--out", out,
-             "--report", page, "--json")
+        link(*logs, "--station", PLACE, "--unit", "rssi=sik", "--unit", "altitude=ft",  # of tables
+             "--power", 20, "--out", out, "--report", page, "--json")
     )  # fmt: skip
     assert told["heights"] == 3
     assert told["exponent"] == 2.0
@@ -112,14 +112,14 @@ def test_what_the_law_leaves_is_a_map_above_it(tmp_path: Path) -> None:
     shadow = 6.0 * np.sin(x / 60) * np.cos(y / 70)
     path = table(tmp_path, replace(flight, rssi=flight.rssi + np.round(1.9 * shadow)))
     (tmp_path / "maps").mkdir()
-    out, found = tmp_path / "link.yaml", tmp_path / "maps" / "m.npz"
+    out, found = tmp_path / "link.yaml", tmp_path / "maps" / "m\U0001f4e1'\".npz"
     given = (path, "--station", PLACE, "--power", 20, "--out", out, "--map", found)
     text = " ".join(link(*given).split())
     assert "dB at legs left out one by one," in text
     assert f"files {out}, {found}" in text
     told = json.loads(link(*given, "--json"))
     assert told["left_out_map_db"] < 0.8 * told["left_out_db"]
-    assert load_yaml(out.read_text(), "link.yaml")["map"] == "maps/m.npz"
+    assert load_yaml(out.read_text(), "link.yaml")["map"] == f"maps/{found.name}"
     plan = small_plan(tmp_path, {"latitude": STATION[0], "longitude": STATION[1], "elevation": 99})
     above = build_problem(read_plan(plan)).bs_uav.gains.above
     assert above is not None

@@ -58,7 +58,7 @@ class _Measured:
         tables: list[list[Any]] = [[]]
         if path.suffix.lower() in (".bin", ".tlog", ".ulg"):
             header = ["time_s", "latitude", "longitude", "altitude_m", "rssi"]
-            units.setdefault("rssi", "raw")
+            units = {"rssi": units.get("rssi", "raw")}  # others are of tables beside it
             tables = [
                 [
                     header,
@@ -72,7 +72,9 @@ class _Measured:
         for rows in tables:
             found = read_measured(path, station, units, points, steps, rows)
             if found.left_out and not rows:
-                cli.note(f"{path}: left out: {counted(found.left_out, 'row')} without a level")
+                told = ", or at the least or the greatest rate, which tell none" if steps else ""
+                lost = counted(found.left_out, "row")
+                cli.note(f"{path}: left out: {lost} without a level{told}")
             over_noise = found.unit == "db"
             if over_noise and (self.power is None) != (self.noise is None):
                 raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")
@@ -204,7 +206,9 @@ def link(
         if found.above is not None and map_file is not None:
             contents[map_file] = map_archive(found.above)
             law["map"] = os.path.relpath(map_file, out.parent)
-        contents[out] = "".join(f"{key}: {json.dumps(law[key])}\n" for key in law).encode()
+        shown = {key: json.dumps(law[key], ensure_ascii=False) for key in law}
+        lines = "".join(f"{key}: {shown[key]}\n" for key in shown)
+        contents[out] = lines.encode(errors="backslashreplace")
     write_together(contents)
     written = [*reversed(contents)]
     cli.show(

@@ -72,13 +72,14 @@ def read_measured(
     path = Path(path)
     header, *rows = rows or _rows(path)
     columns = _columns(path, [*map(str, header)], units)
-    found = np.array([[_number(row, k) for row in rows] for k, *_ in columns])
+    found = np.array([[_number(row, k, name) for row in rows] for k, name, _ in columns])
     found *= [[float(_COLUMNS[name][1].get(unit) or 1.0)] for _, name, unit in columns]
     found[4], unit = _level(path, found[4], columns[4][2], calibration, rates)
     sound = np.isfinite(found).all(axis=0)
     if not sound.any():
         names = ", ".join(name for _, name, _ in columns)
-        raise InputError(f"{path}: no row with {names}; expected the rows of a flight")
+        told = ", between the least and the greatest of --rates" if rates else ""
+        raise InputError(f"{path}: no row with {names}{told}; expected the rows of a flight")
     t, latitude, longitude, altitude, level = found[:, sound]
     (least, most), middle = _SOUND[unit], float(np.median(level))
     if not least <= middle <= most:
@@ -126,7 +127,7 @@ def _level(
         return told, unit
     if unit not in ("sik", "raw"):
         if rates is None or not rates.rates:
-            raise InputError(f"{path}: a throughput; give --rates, the table of the radio's rates")
+            raise InputError(f"{path}: a throughput; give --rates, the radio's table, with some above 0")
         told = np.where(told < rates.most, told, np.nan)
         return np.interp(told, rates.rates, rates.snr_db, left=np.nan), "db"
     if unit == "raw" and len(calibration) < 2:
@@ -156,7 +157,8 @@ def _columns(
         if not name or what in found:
             continue
         unit, known = units.get(name, "_".join(rest)).lower(), _COLUMNS[name][1]
-        if unit not in known and (unit or name not in places[:3]):  # seconds and degrees
+        by_itself = name in places[:3] and name not in units  # seconds and degrees
+        if unit not in known and (unit or not by_itself):
             raise InputError(
                 f"{path}: line 1: {told!r} has {f'unit {unit!r}' if unit else 'no unit'}; name it "
                 f"in the header or give --unit {name}=UNIT, one of {', '.join(known)}"
@@ -167,9 +169,11 @@ def _columns(
     return [found[what] for what in (*places, levels)]
 
 
-def _number(row: Sequence[str | float], column: int) -> float:
-    """Return the number, or the time of a day, in that column; NaN for what is none."""
-    for read in (float, lambda cell: datetime.fromisoformat(cell.strip()).timestamp()):
-        with suppress(ValueError, IndexError):
-            return read(row[column])
+def _number(row: Sequence[str | float], column: int, name: str) -> float:
+    """Return the number in that column, of times also that of a date; NaN for what is none."""
+    with suppress(ValueError, IndexError):
+        return float(row[column])
+    with suppress(ValueError, IndexError):
+        if name == "time":
+            return datetime.fromisoformat(str(row[column]).strip()).timestamp()
     return math.nan

@@ -247,10 +247,11 @@ def test_decimal_commas_times_of_day_and_rows_without_a_number(tmp_path: Path) -
     header = "time;lat;lon;alt_m;snr_db"
     rows = [f"2024-05-01T10:00:{k:02d}Z;-34,999;149,0;60,0;1{k % 10},5" for k in range(20)]
     rows[3], rows[7], rows[9] = "not a row", "2024-05-01T10:00:07Z;-34,999;149,0;60,0;NaN", ""
+    rows[5] = "2024-05-01T10:00:05Z;-34,999;149,0;60,0;2024-05-01"  # of times alone a number
     path = tmp_path / "levels.csv"
     path.write_text("\n".join(["# a remark", header, *rows]))
     found = read_measured(path, ANTENNA)
-    assert (len(found.t), found.left_out) == (17, 2)
+    assert (len(found.t), found.left_out) == (16, 3)
     assert (np.ptp(found.t), found.level[0]) == (19.0, 10.5)
 
 
