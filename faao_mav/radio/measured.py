@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, printable
 from faao_mav.files import read_text, table
 from faao_mav.geodesy import LocalFrame
 from faao_mav.radio.fit import Samples
@@ -95,7 +95,7 @@ def read_measured(
             "a flight about it: are latitude and longitude exchanged?"
         )
     place = np.column_stack([local, altitude - station[2]])
-    return Samples(t, place, level, path.name, unit, int(np.sum(~sound)))
+    return Samples(t, place, level, printable(path.name), unit, int(np.sum(~sound)))
 
 
 def _rows(path: Path) -> list[list[str]]:
@@ -127,7 +127,7 @@ def _level(
         return told, unit
     if unit not in ("sik", "raw"):
         if rates is None or not rates.rates:
-            raise InputError(f"{path}: a throughput; give --rates, the radio's table, with some above 0")
+            raise InputError(f"{path}: a throughput; give --rates, the radio's, some above 0")
         told = np.where(told < rates.most, told, np.nan)
         return np.interp(told, rates.rates, rates.snr_db, left=np.nan), "db"
     if unit == "raw" and len(calibration) < 2:
