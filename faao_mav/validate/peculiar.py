@@ -112,8 +112,7 @@ def _alone(context: ValidationContext) -> Hits:
             yield hit("ardupilot-frame-mission", k)
         if command in _SKIPPED.get(context.vehicle.kind, ()):
             yield hit("ardupilot-command-skipped", k)
-        does = _left_out(context, item)
-        if does and command not in _SKIPPED.get(context.vehicle.kind, ()):
+        elif does := _left_out(context, item):
             yield hit("ardupilot-left-out", k, does=does)
         if command in CONDITIONS and in_mission:
             yield hit("px4-command-rejected", k)
