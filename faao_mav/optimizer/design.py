@@ -212,10 +212,14 @@ def design(plan: Plan, own: OwnPrecoder | None = None) -> Design:
     )
 
 
+def largest_power(P: Complex) -> float:
+    """Return the largest power of the precoders P (..., N_t, N_t), W."""
+    return float(np.sum(np.abs(P) ** 2, axis=(-2, -1)).max())
+
+
 def check_power(P: Complex, power: float, source: str) -> None:
     """Raise `InputError`, which names `source`, for precoders (..., N_t, N_t) above `power`, W."""
-    used = float(np.sum(np.abs(P) ** 2, axis=(-2, -1)).max())
-    if used > power * (1 + 1e-6):
+    if (used := largest_power(P)) > power * (1 + 1e-6):
         raise InputError(f"{source}: has {used / power:.4g} times the power that it may have")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from faao_mav.arrays import Complex, Integers, Real
 from faao_mav.errors import InputError, quote
 from faao_mav.files import read_archive, write_whole
-from faao_mav.optimizer.design import Link, check_power
+from faao_mav.optimizer.design import Link, check_power, largest_power
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem
 from faao_mav.plan import Plan, parse_plan
@@ -263,8 +263,7 @@ class Solution:
             found["fence"] = max(0.0, problem.fence.margin - clearance)
         powers = "(13b) power of the base station", "(13c) power of the relay"
         for hop, (link, H_r, P) in enumerate(self.hops):
-            used = float(np.sum(np.abs(P) ** 2, axis=(-2, -1)).max())
-            found[powers[hop]] = max(0.0, used / link.power - 1)
+            found[powers[hop]] = max(0.0, largest_power(P) / link.power - 1)
             found[f"({hop + 1}) fading"] = float(np.abs(H_r - link.small_scale(self.w)).max())
         told = np.array([self.I_U, self.I_G])
         found["(9) rate"] = float(np.abs(np.array(self.recomputed_slots()) - told).max())
