@@ -215,6 +215,7 @@ def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
     if least is None:
         return None
     below = least.below
+    less = 0.0 if below is None else worth(below)
     return {
         "minimise": plan.goal.minimise,
         "maximise": plan.goal.maximise,
@@ -225,10 +226,7 @@ def _goal_as_dict(solution: Solution) -> dict[str, Any] | None:
         "energy_wh": solution.energy_wh,
         "limit": least.limit,
         "one_step_less": below
-        and {
-            "delivered_rate": worth(below),
-            "delivered_mbytes": below.plan.megabytes(worth(below)),
-        },
+        and {"delivered_rate": less, "delivered_mbytes": below.plan.megabytes(less)},
         "optimizations": least.optimizations,
     }
 

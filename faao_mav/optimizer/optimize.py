@@ -95,35 +95,38 @@ def best_height(plan: Plan, solve: Solve) -> Solution:
 
     low, high = _limits(plan)
     solved: dict[float, Solution] = {}
-    refused: dict[float, Exception] = {}
+    worths: dict[float, float] = {}
+    refused: list[Exception] = []
 
-    def found_at(height: float) -> float:
+    def worth_at(height: float) -> float:
         at = round(float(height), _DECIMALS)
-        if at not in solved and at not in refused:
+        if at not in worths:
             near = min(solved, key=lambda other: abs(other - at), default=None)
             known = None if near is None else solved[near].trajectory
             try:
                 solved[at] = solve(plan.changed({"flight.altitude": at}), known)
+                worths[at] = _worth(solved[at])
             except (InfeasibleError, PlanError) as error:
-                refused[at] = error
-        return _worth(solved[at]) if at in solved else -math.inf
+                refused.append(error)
+                worths[at] = -math.inf
+        return worths[at]
 
     grid = np.linspace(low, high, _EVENLY)
-    values = np.array([-math.inf, *map(found_at, grid), -math.inf])
+    values = np.array([-math.inf, *map(worth_at, grid), -math.inf])
     if not solved:
-        raise next(iter(refused.values()))
+        raise refused[0]
     inner = values[1:-1]
     peaks = np.flatnonzero((inner >= values[:-2]) & (inner >= values[2:]) & np.isfinite(inner))
     least = float(inner[np.isfinite(inner)].min()) - 1.0  # instead of what has no flight
     for k in peaks.tolist():
         about = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
         minimize_scalar(
-            lambda height: -max(found_at(height), least),
+            lambda height: -max(worth_at(height), least),
             bounds=about,
             method="bounded",
             options={"xatol": 10.0**-_DECIMALS},
         )
-    best = max(solved.values(), key=_worth)
+    best = solved[max(solved, key=worths.__getitem__)]
     at_low, at_high = (solved.get(round(end, _DECIMALS)) for end in (low, high))
     return replace(best, height=BestHeight(low, high, at_low, at_high, len(solved)))
 
