@@ -140,7 +140,7 @@ def read_terrain(path: str | Path) -> tuple[Raster, int]:
 
     Those are as at the nearest place that is. Raises `InputError` as `read_raster` does.
     """
-    raster = read_raster(path, "heights in one band", _MOST_HEIGHTS)
+    raster = read_raster(path, "heights in one band (.hgt named as N47E008.hgt)", _MOST_HEIGHTS)
     values = np.where((raster.values < -500) | (raster.values > 9000), np.nan, raster.values)
     unknown = np.isnan(values)
     if unknown.all():
