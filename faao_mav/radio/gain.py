@@ -87,13 +87,7 @@ class PathGain(GainFunction):
         """Return l, the natural logarithm of the linear gain, (...)."""
         by_distance = np.log(self.reference_gain) - self.exponent / 2 * np.log(squared_distance)
         s = height / np.sqrt(squared_distance)
-        return np.asarray(by_distance + polynomial(self._terms(0), s))
-
-    def by_log_distance(self, squared_distance: Real, height: float) -> tuple[Real, Real]:
-        """Return l_t and l_tt (...) by t = ln d², where d s / d t = -s / 2."""
-        s = height / np.sqrt(squared_distance)
-        by_t = polynomial(self._terms(1), s) - self.exponent / 2
-        return by_t, polynomial(self._terms(2), s)
+        return np.asarray(by_distance + polynomial(self._terms, s))
 
     def turns(self, farthest: float, height: float) -> Real:
         """Return where l turns, as distances on the ground (k,) from 0 to `farthest`, m.
@@ -103,20 +97,16 @@ class PathGain(GainFunction):
         >>> PathGain(1e-5, elevation_db=(0.0, -10.0)).turns(900.0, 100.0).round(1).tolist()
         [0.0, 114.1, 900.0]
         """
-        by_t = self._terms(1)
-        by_t[-1] -= self.exponent / 2
-        roots = np.sign(height) * np.roots(by_t)
+        by_s = np.arange(len(self._terms) - 1, 0, -1) * self._terms[:-1]  # d s / d ln d² is -s/2
+        roots = np.sign(height) * np.roots([*by_s, self.exponent])
         s = roots.real[np.abs(roots.imag) < _REAL * np.abs(roots)]
         found = np.abs(height) * np.sqrt(1 / s[(s > 0) & (s <= 1)] ** 2 - 1)
         return np.array([0.0, *np.sort(found[found < farthest]), farthest])
 
-    def _terms(self, order: int) -> Real:
-        """Return the terms of the elevation, or those of the derivative of an `order` by t.
-
-        They are coefficients by powers of s, the highest first, (k + 1,), natural logarithms.
-        """
-        terms = PER_DB * np.array([*self.elevation_db[::-1], 0.0])
-        return np.asarray((np.arange(len(terms) - 1, -1, -1) / -2) ** order * terms)
+    @property
+    def _terms(self) -> Real:
+        """The terms of the elevation, natural logarithms, by powers of s, the highest first."""
+        return PER_DB * np.array([*self.elevation_db[::-1], 0.0])
 
 
 @dataclass(frozen=True, eq=False)
