@@ -64,6 +64,8 @@ def distances_to_path(points: Real, path: Real) -> Real:
     """
     import shapely  # seldom needed, and slow to load
 
-    line = shapely.linestrings(np.vstack([path, path[-1:]]))  # of two places at least
+    ends = np.vstack([path, path[-1:]])  # of one leg at least
+    legs = shapely.STRtree(shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1)))
     with np.errstate(divide="ignore", invalid="ignore"):  # the length of a leg may underflow
-        return np.asarray(shapely.distance(shapely.points(points), line))
+        near = legs.query_nearest(shapely.points(points), return_distance=True, all_matches=False)
+    return np.asarray(near[1])

@@ -95,6 +95,8 @@ def largest(function: Callable[[Real], Real], value: Real, most: Real | float) -
     """Return the largest x, 0 to `most`, at which the rising `function` is at most `value`."""
     low = np.zeros(np.broadcast_shapes(np.shape(value), np.shape(most)))
     high = low + most
+    if np.all(function(high) <= value):  # as for most legs
+        return high
     for _ in range(int(FACTS.halvings)):
         middle = (low + high) / 2
         under = function(middle) <= value

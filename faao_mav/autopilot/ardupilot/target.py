@@ -160,8 +160,9 @@ class Target:
                 continue
             along = np.array([entry[k] * t, np.full(len(t), entry[k]), np.zeros(len(t))])
             for each, change, begin in zip(ramps, changes, begins, strict=True):
-                along += change[k] * each[k].at(t - begin[k])
-            motion[part] += np.kron(along.T, ways[k])
+                if change[k] != 0:
+                    along += change[k] * each[k].at(t - begin[k])
+            motion[part] += (along.T[:, :, None] * ways[k]).reshape(-1, 9)
         self.motion: Real = motion[:-1]
 
 
