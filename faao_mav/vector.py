@@ -65,7 +65,9 @@ def distances_to_path(points: Real, path: Real) -> Real:
     import shapely  # seldom needed, and slow to load
 
     ends = np.vstack([path, path[-1:]])  # of one leg at least
-    legs = shapely.STRtree(shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1)))
+    each = np.asarray(shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1)))
     with np.errstate(divide="ignore", invalid="ignore"):  # the length of a leg may underflow
-        near = legs.query_nearest(shapely.points(points), return_distance=True, all_matches=False)
+        near = shapely.STRtree(each).query_nearest(
+            shapely.points(points), return_distance=True, all_matches=False
+        )
     return np.asarray(near[1])
