@@ -18,8 +18,9 @@ from faao_mav.radio.best_precoder import best_precoders, has_closed_form
 from faao_mav.radio.channel import line_of_sight_ula, rician
 from faao_mav.radio.constellation import DifferenceClasses, difference_classes
 from faao_mav.radio.gain import GainField
+from faao_mav.radio.mutual_information import mutual_information
 from faao_mav.radio.precoder import SCHEMES
-from faao_mav.radio.rate import Measure, draw_rates
+from faao_mav.radio.rate import Measure, cutoff_rate
 from faao_mav.radio.rate_steps import StreamRate, one_stream
 
 OwnPrecoder: TypeAlias = Callable[[RealOrComplex, float, float], Complex]
@@ -84,13 +85,8 @@ class Link:
 
     def line_of_sight_at(self, cosine: Real) -> Complex:
         """Return H^LoS (..., N_r, N_t) at direction cosines u = (x - x_j) / d (...)."""
-        if not self.follows_position:
-            ones = np.ones((self.receive, self.transmit), dtype=np.complex128)
-            return np.broadcast_to(ones, (*cosine.shape, *ones.shape))
-        across = np.sqrt(np.maximum(0.0, 1 - cosine**2))
-        outward = np.stack([cosine, across, np.zeros_like(cosine)], axis=-1)
-        wave = outward if self.to_relay else -outward
-        return line_of_sight_ula(wave, self.receive, self.transmit)
+        along = (1 if self.to_relay else -1) * self.follows_position  # of all ones u is 0
+        return line_of_sight_ula(along * cosine, self.receive, self.transmit)
 
     def fade(self, los: Complex) -> Complex:
         """Return H_r for line-of-sight parts `los` (N + 2, N_r, N_t).
@@ -118,17 +114,17 @@ class Link:
         """Return the rates of the channels H ((S,) ..., N_r, N_t), bits ((S,) ...).
 
         P is (..., N_t, N_t), or has the axis of the draws too. Of the mutual information the mean
-        over the draws is accurate: see `radio.rate`.
+        over the draws is accurate: see `radio.mutual_information`.
         """
         if self.steps is not None:
             return self.steps.value(self.snr(H, P))
-        if not self.averaged:
-            H, P = H[..., None, :, :], P[..., None, :, :]
-            return draw_rates(self.measure, H, P, self.modulation, self.noise)[..., 0]
-        P = np.moveaxis(P, 0, -3) if P.ndim == H.ndim else P[..., None, :, :]
-        H = np.moveaxis(H, 0, -3)
-        rates = draw_rates(self.measure, H, P, self.modulation, self.noise)
-        return np.ascontiguousarray(np.moveaxis(rates, -1, 0))
+        if self.measure == "cutoff":
+            return cutoff_rate(H, P, self.modulation, self.noise)
+        every = self.averaged and P.ndim == H.ndim
+        H = np.moveaxis(H, 0, -3) if self.averaged else H[..., None, :, :]
+        P = np.moveaxis(P, 0, -3) if every else P[..., None, :, :]
+        rates = np.moveaxis(mutual_information(H, P, self.modulation, self.noise), -1, 0)
+        return np.ascontiguousarray(rates) if self.averaged else rates[0]
 
     def snr(self, H: Complex, P: Complex) -> Real:
         """Return ||H P||² / sigma², the SNR of one stream, linear, for H and P of `draw_rates`."""

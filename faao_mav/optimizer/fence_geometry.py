@@ -200,12 +200,7 @@ def fence_geometry(plan: Plan) -> FenceGeometry | None:
         corners = shapely.get_coordinates(shapely.orient_polygons(hull))[:-1]
         normals, offsets = ConvexObstacles.of([(corners, 0.0)]).sides
         sides.append((normals[0], offsets[0]))
-    ends = shapely.points([plan.flight.start, plan.flight.end])
-    most = plan.max_ground_speed * plan.flight.duration + 2 * plan.margin
-    near = [
-        (piece, radius)
-        for piece, radius in pieces
-        if shapely.distance(shapely.MultiPoint(piece).convex_hull, ends).sum() - 2 * radius <= most
-    ]
     normals, offsets = (np.concatenate(each) for each in zip(*sides, strict=True))
-    return FenceGeometry(ConvexObstacles.of(near), normals, offsets[:, 0], plan.margin)
+    fence = FenceGeometry(ConvexObstacles.of(pieces), normals, offsets[:, 0], plan.margin)
+    ends = np.array([plan.flight.start, plan.flight.end])
+    return fence.near(ends, plan.max_ground_speed * plan.flight.duration / 2)

@@ -99,8 +99,8 @@ def reach_goal(plan: Plan, *, observe: Observer | None = None) -> Solution:
         low, high = -math.ceil((dbm(min(plan.powers)) - MIN_DBM) / POWER_STEP), 0
         less = low * POWER_STEP * _BITS_PER_DB
     else:
-        limit, at = flights.taken / JOULES_PER_WH, flights.of_share
-        low, high = 0, round(1 / ENERGY_SHARE)
+        limit, step = flights.taken / JOULES_PER_WH, ENERGY_SHARE * flights.taken
+        low, high, at = 0, round(1 / ENERGY_SHARE), lambda number: flights.within(number * step)
     solved = {high: flights.whole}
 
     def surplus(number: int) -> float:
@@ -190,10 +190,6 @@ class _Flights:
         """Return the flight with so many steps of `POWER_STEP` more power, fewer below 0."""
         powers = zip(ALIASES[POWER], map(dbm, self.plan.powers), strict=True)
         return self.changed({key: round(own + steps * POWER_STEP, 6) for key, own in powers})
-
-    def of_share(self, shares: int) -> Solution:
-        """Return the flight within so many shares of the energy that `whole` takes."""
-        return self.within(shares * ENERGY_SHARE * self.taken)
 
     def within(self, energy: float) -> Solution:
         """Return the flight of most data within `energy`, or where a rate is asked for of that.

@@ -92,7 +92,7 @@ def _information(link: Link, H: Complex, P: Complex) -> tuple[float, Real, float
     pairs = H.shape[:-2]
     wide = np.broadcast_to(P, (*pairs, *P.shape[-2:]))
     H, P = H.reshape(-1, *H.shape[-2:]), wide.reshape(-1, *P.shape[-2:])
-    cutoff = cutoff_rate(H, P, link.classes, link.noise)
+    cutoff = cutoff_rate(H, P, link.modulation, link.noise)
     noises = min(_MOST_NOISES, _LIKELIHOODS // link.classes.symbols)
     count = min(len(H), noises // _NOISES_PER_PAIR)
     # Rounded: the order of equal rates, and so the sample, is the same whoever sums them.

@@ -244,10 +244,6 @@ class Solution:
         )
         return first, second
 
-    def recomputed(self, power: float = 1.0) -> Rates:
-        """Return the means of `recomputed_slots`."""
-        return Rates.of(*self.recomputed_slots(power))
-
     def residuals(self) -> dict[str, float]:
         """Return by how much each constraint of (13) is missed, computed from the arrays alone.
 

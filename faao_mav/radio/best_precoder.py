@@ -27,13 +27,10 @@ from faao_mav.radio.mutual_information import NODES, mutual_information
 from faao_mav.radio.precoder import bpsk_two_antennas, check_positive, with_power
 from faao_mav.radio.rate import ClassSum, Measure, class_sum
 
-_FAINT = 1e-4
-"""Trace of the gain matrix G below which the rate is proportional to the power: the best P is then
-the same at any lower power, and is searched at this one. Chosen."""
-
-_SATURATED = 40.0
-"""The smallest exponent beyond which no rate can tell precoders apart: of stronger links the search
-is done at the power where it is this, since F bends more the higher the SNR. Chosen."""
+_FAINT, _STRONG = 1e-4, 1000.0
+"""Traces of the gain matrix G between which precoders are searched, the largest for differences of
+length 1. Below, the rate is proportional to the power, and the best P is the same at any lower one.
+Beyond, all rates are those of a link without errors. Chosen: sums of e^-700 are still numbers."""
 
 _RANDOM_STARTS = 12
 """Random starts for each channel. Chosen."""
@@ -132,9 +129,13 @@ def _searched(A: Complex, modulation: str, measure: Measure, start: Complex | No
     _, gains, Vh = np.linalg.svd(A.reshape(b, S * receive, N), full_matrices=False)
     V = Vh.conj().mT
     modes = A @ V[:, None]
-    sums = class_sum(difference_classes(modulation, N))
+    classes = difference_classes(modulation, N)
     starts = starting_points(gains, N) if start is None else unit(Vh @ start)[None]
-    G = _levelled(sums, modes.conj().mT @ modes / 4, starts)
+    G = modes.conj().mT @ modes / 4
+    size = np.max(np.trace(G, axis1=-2, axis2=-1).real, axis=1)[:, None, None, None]
+    strong = _STRONG / np.sum(np.abs(classes.vectors[0]) ** 2)
+    G *= np.clip(size, _FAINT, strong) / np.where(size > 0.0, size, 1.0)
+    sums = class_sum(classes)
     cutoff = last = _cutoff_objective(sums, G)
     rounds = [(cutoff, cutoff)] if S == 1 < b else []
     if measure == "mutual_information":
@@ -144,7 +145,9 @@ def _searched(A: Complex, modulation: str, measure: Measure, start: Complex | No
         starts = _kept(_cutoff_objective(sums, G[:, :: max(1, S // _DRAWS)]), cutoff, starts)
         # In the basis of the modes channels of equal singular values have equal optima, and those
         # of the mutual information change their kind at other SNRs than those of the cutoff rate.
-        near = neighbours(gains[:, 0])
+        order = np.argsort(gains[:, 0], kind="stable")
+        rank = np.argsort(order, kind="stable")
+        near = [order[np.clip(rank + k, 0, b - 1)] for k in _NEIGHBOURS]
         for few, objective in rounds:
             starts = _kept(few, objective, np.concatenate([starts, starts[0, near]]))
     Q, _ = minimise(last, starts[0], _FINE)
@@ -160,17 +163,6 @@ def _kept(few: Objective, objective: Objective, starts: Complex) -> Complex:
         best = np.argsort(F.reshape(k, b), axis=0)[:_KEPT]
         starts = found[best, np.arange(b)]
     return starts
-
-
-def _levelled(sums: ClassSum, G: Complex, starts: Complex) -> Complex:
-    """Return G (b, S, q, q) at the powers at which precoders are searched from `starts`."""
-    largest = np.max(np.trace(G, axis1=-2, axis2=-1).real, axis=1)
-    z = coordinates(starts.conj().mT[:, :, None] @ G @ starts[:, :, None])
-    exponent = sums.least(z.reshape(-1, z.shape[-1])).reshape(z.shape[:-1])
-    depth = np.max(np.min(exponent, axis=2), axis=0)  # of the weakest draw, at the best start
-    factor = np.maximum(1.0, _FAINT / np.where(largest > 0.0, largest, 1.0))
-    factor *= _SATURATED / np.maximum(depth, _SATURATED)
-    return np.asarray(G * factor[:, None, None, None])
 
 
 def _cutoff_objective(sums: ClassSum, G: Complex) -> Objective:
@@ -234,13 +226,6 @@ def unit(Q: Complex) -> Complex:
     return np.asarray(filled / np.linalg.norm(filled, axis=(-2, -1), keepdims=True))
 
 
-def neighbours(gain: Real) -> Integers:
-    """Return the channels (k, b) next to each of b in the order of their gains (b,)."""
-    order = np.argsort(gain, kind="stable")
-    rank = np.argsort(order, kind="stable")
-    return np.stack([order[np.clip(rank + k, 0, len(gain) - 1)] for k in _NEIGHBOURS])
-
-
 def minimise(objective: Objective, Q: Complex, tolerance: float) -> tuple[Complex, Real]:
     """Return Q (..., b, q, N) and F (..., b) where BFGS steps lead on ||Q||_F = 1; F never rises.
 
@@ -272,7 +257,8 @@ def minimise(objective: Objective, Q: Complex, tolerance: float) -> tuple[Comple
         if not len(going):
             break
         step *= np.minimum(1.0, _LONGEST / np.linalg.norm(step, axis=1))[:, None]
-        trial = unit(_matrices(x[going] + reach[going, None] * step, q, N))
+        moved = x[going] + reach[going, None] * step
+        trial = unit(moved.view(np.complex128).reshape(-1, q, N))
         reached, slope = objective(going % b, trial)
         new = _along(trial, slope)
         _update(inverse, going, new[0] - x[going], new[1] - gradient[going], scale=number == 0)
@@ -280,18 +266,14 @@ def minimise(objective: Objective, Q: Complex, tolerance: float) -> tuple[Comple
         reach[going] = np.where(better, np.minimum(1.0, 4 * reach[going]), 0.25 * reach[going])
         at = going[better]
         x[at], gradient[at], radial[at], F[at] = (part[better] for part in (*new, reached))
-    return _matrices(x, q, N).reshape(*most, b, q, N), F.reshape(*most, b)
+    return x.view(np.complex128).reshape(*most, b, q, N), F.reshape(*most, b)
 
 
 def _along(Q: Complex, slope: Complex) -> tuple[Real, Real, Real]:
-    """Return [Re Q, Im Q] (b, m), the gradient along the sphere (b, m), and that outwards (b,)."""
-    x, gradient = (np.concatenate([M.real, M.imag], axis=1).reshape(len(M), -1) for M in (Q, slope))
+    """Return Q as real numbers (b, m), the gradient along the sphere (b, m), and outwards (b,)."""
+    x, gradient = (np.ascontiguousarray(M).reshape(len(M), -1).view(float) for M in (Q, slope))
     radial = np.sum(x * gradient, axis=1)
     return x, gradient - radial[:, None] * x, radial
-
-
-def _matrices(x: Real, q: int, N: int) -> Complex:
-    return (x[:, : q * N] + 1j * x[:, q * N :]).reshape(-1, q, N)
 
 
 def _update(inverse: Real, at: Integers, s: Real, y: Real, *, scale: bool) -> None:

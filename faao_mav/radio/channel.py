@@ -10,30 +10,21 @@ from faao_mav.arrays import Complex, Real, RealOrComplex
 from faao_mav.errors import InputError
 
 
-def line_of_sight_ula(path: Real, receive: int, transmit: int) -> Complex:
+def line_of_sight_ula(cosine: Real, receive: int, transmit: int) -> Complex:
     """Return H^LoS of uniform linear arrays half a wavelength apart, both lying along east.
 
     Entry (l, m) of the result, (..., receive, transmit) and of rank one, is exp(-jπ (l - m) u):
     moving the receiving element east along the wave lengthens its way, moving the transmitting one
-    shortens it. u is the east component of the unit vector along the wave. The phase common to all
-    entries, 2π d/λ, changes no rate and is left out.
+    shortens it. u (...), `cosine`, is the east component of the unit vector along the wave, from
+    transmitter to receiver, which are far apart for such arrays. The phase common to all entries,
+    2π d/λ, changes no rate and is left out. `receive` and `transmit` are numbers of antennas.
 
-    `path` (..., 3) is the vector east, north, up from transmitter to receiver, in any unit and far
-    longer than the arrays: [w - p_B, H] for BS to UAV, [p_U - w, -H] for UAV to GU. `receive` and
-    `transmit` are numbers of antennas. Raises `InputError` for a path without a length.
-
-    >>> np.round(line_of_sight_ula(np.array([1.0, 0.0, 0.0]), 2, 2), 12).real
+    >>> np.round(line_of_sight_ula(np.array(1.0), 2, 2), 12).real
     array([[ 1., -1.],
            [-1.,  1.]])
     """
-    path = np.asarray(path, dtype=np.float64)
-    length = np.linalg.norm(path, axis=-1)
-    if not np.all(length > 0.0):
-        raise InputError("transmitter and receiver are in the same place: no direction between")
-    u = np.asarray(path[..., 0] / length)
     steps = np.arange(receive)[:, None] - np.arange(transmit)
-    entries: Complex = np.exp(-1j * np.pi * steps * u[..., None, None])
-    return entries
+    return np.asarray(np.exp(-1j * np.pi * steps * cosine[..., None, None]))
 
 
 def rayleigh(rng: np.random.Generator, slots: int, receive: int, transmit: int) -> Complex:

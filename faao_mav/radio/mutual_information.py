@@ -14,10 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from faao_mav.arrays import CACHE, Complex, Integers, Real, RealOrComplex
-from faao_mav.errors import InputError
 from faao_mav.radio.constellation import constellation, symbol_vectors
-
-_LN2 = float(np.log(2.0))
+from faao_mav.radio.precoder import check_positive
 
 NODES = 2048
 """Pairs of a vector sent and a noise, each used with both signs, for all draws of a channel.
@@ -113,8 +111,7 @@ def mutual_information(
     >>> mutual_information(one, one, "bpsk", 1.0).round(3)  # exactly 0.721452
     array([0.721])
     """
-    if not noise > 0.0:
-        raise InputError(f"the noise power must be above 0, got {noise}")
+    check_positive("noise power", noise)
     A = np.asarray(H, dtype=np.complex128) @ P
     S, receive, N = A.shape[-3:]
     points, rows, noises = noise_set(modulation, N, S, nodes, seed)
@@ -148,7 +145,7 @@ def mutual_information(
                 missed_products[channels] += x.mT @ x.conj() / q
     # The sum in (5) is never below its own term: only rounding makes its logarithm negative.
     bits = np.log2(len(points))
-    return np.asarray(bits - np.maximum(value / q, 0.0) / _LN2).reshape(A.shape[:-2])
+    return np.asarray(bits - np.maximum(value / q, 0.0) / np.log(2.0)).reshape(A.shape[:-2])
 
 
 def _maps(A: Complex, noise: float, *, real: bool) -> Real:

@@ -1,4 +1,4 @@
-"""The rate that counts: the cutoff rate (7), (8) in closed form, or the mutual information.
+"""The cutoff rate (7), (8), in closed form: one of the two rates that may count.
 
 The cutoff rate is what is known of every code, a lower bound on the mutual information (5), (6);
 that is what the best codes come near to.
@@ -16,48 +16,24 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from faao_mav.arrays import CACHE, Complex, Real, RealOrComplex
-from faao_mav.errors import InputError
 from faao_mav.radio.constellation import (
     DifferenceClasses,
     coordinates,
     difference_classes,
     features,
 )
-from faao_mav.radio.mutual_information import mutual_information
+from faao_mav.radio.precoder import check_positive
 
 Measure: TypeAlias = Literal["cutoff", "mutual_information"]
 """The name of the rate that counts."""
-
-_NEAREST = 2048
-"""Classes, the nearest first, among which the smallest exponent is looked for. Chosen."""
 
 _TINY = 1e-300
 """The least sum that is told from zero, s is above -691, and the least power that is divided by."""
 
 
-def draw_rates(
-    measure: Measure, H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float
-) -> Real:
-    """Return the rate of every draw of a channel, (..., S) bit/s/Hz.
-
-    Of the mutual information the mean over the S draws is accurate. Arguments and errors are those
-    of ``mutual_information``.
-
-    >>> one = np.ones((1, 1, 1))
-    >>> for measure in ("cutoff", "mutual_information"):
-    ...     print(draw_rates(measure, one, one, "bpsk", 1.0).round(3))
-    [0.548]
-    [0.721]
-    """
-    if measure == "mutual_information":
-        return mutual_information(H, P, modulation, noise)
-    return cutoff_rate(H, P, difference_classes(modulation, np.shape(P)[-1]), noise)
-
-
 def _coordinates(H: RealOrComplex, P: RealOrComplex, noise: float) -> Real:
     """Return z of Z = P^H H^H H P / (4 σ²), (..., N_t²)."""
-    if not noise > 0.0:
-        raise InputError(f"the noise power must be above 0, got {noise}")
+    check_positive("noise power", noise)
     A = np.asarray(H) @ np.asarray(P) / (2.0 * np.sqrt(noise))
     return coordinates(np.asarray(A.conj().mT @ A, dtype=np.complex128))
 
@@ -76,23 +52,22 @@ def exponents(H: RealOrComplex, P: RealOrComplex, u: RealOrComplex, noise: float
     return np.maximum(D, 0.0, out=D)
 
 
-def cutoff_rate(
-    H: RealOrComplex, P: RealOrComplex, classes: DifferenceClasses, noise: float
-) -> Real:
-    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz, (...) from 0 to ``classes.bits``.
+def cutoff_rate(H: RealOrComplex, P: RealOrComplex, modulation: str, noise: float) -> Real:
+    """Return the cutoff rate of a link, (7) or (8), in bit/s/Hz, (...) from 0 to N log2(rho).
 
     R_0 = 2 N log2(rho) - log2 Σ_m Σ_k exp(-||H P u_mk||² / (4 σ²)), the double sum taken over the
     classes: N log2(rho) - log2(1 + Σ multiplicity e^-D / rho^N).
 
     `H` (..., N_r, N_t) are channels and `P` (..., N_t, N_t) precoders, whose leading axes
-    broadcast; `classes` are the differences of the alphabet on N_t antennas; `noise` is σ², W.
-    Raises `InputError` for a noise not above 0.
+    broadcast; `modulation` is the alphabet, one of ``MODULATIONS``; `noise` is σ², W. Raises
+    `InputError` for an unknown modulation or a noise not above 0.
 
-    >>> float(cutoff_rate(np.eye(1), np.eye(1), difference_classes("bpsk", 1), 1.0).round(6))
+    >>> float(cutoff_rate(np.eye(1), np.eye(1), "bpsk", 1.0).round(6))
     0.548059
     """
+    classes = difference_classes(modulation, np.shape(P)[-1])
     z = _coordinates(H, P, noise)
-    s = class_sum(classes).value(z.reshape(-1, z.shape[-1]))
+    s, _ = class_sum(classes).moments(z.reshape(-1, z.shape[-1]))
     rate: Real = classes.bits - np.logaddexp(0.0, s) / np.log(2.0)
     return np.maximum(rate, 0.0).reshape(z.shape[:-1])
 
@@ -104,8 +79,8 @@ class ClassSum:
     log2(1 + e^s). Where it is below the least number s is about -691.
 
     >>> sums = ClassSum(difference_classes("bpsk", 1))
-    >>> sums.value(np.array([[2.0]]))  # one class, u = 2, of two pairs: ln(2 e^(-4 z) / 2)
-    array([-8.])
+    >>> sums.moments(np.array([[2.0]]))  # one class, u = 2, of two pairs: ln(2 e^(-4 z) / 2)
+    (array([-8.]), array([[4.]]))
     """
 
     def __init__(self, classes: DifferenceClasses) -> None:
@@ -114,33 +89,22 @@ class ClassSum:
         self._terms = np.hstack([weights, weights * self._phi])
         self._exponents = len(self._phi)
 
-    def value(self, z: Real) -> Real:
-        """Return s, (b,), at z (b, N²)."""
-        return np.asarray(np.log(np.maximum(self.sums(z, 1)[:, 0], _TINY)))
-
     def moments(self, z: Real) -> tuple[Real, Real]:
         """Return s (b,) and the mean of φ under the terms of the sum (b, N²), at z (b, N²)."""
-        sums = self.sums(z, 1 + z.shape[1])
+        sums = self.sums(z)
         total = np.maximum(sums[:, :1], _TINY)
         return np.log(total[:, 0]), sums[:, 1:] / total
 
-    def least(self, z: Real) -> Real:
-        """Return the smallest exponent of the nearest differences, (b,), at z (b, N²)."""
-        phi = self._phi[:_NEAREST].T
-        step = max(1, CACHE // phi.shape[1])
-        parts = [(z[i : i + step] @ phi).min(axis=1) for i in range(0, len(z), step)]
-        return np.concatenate(parts)
-
-    def sums(self, z: Real, columns: int) -> Real:
-        """Return the first `columns` of Σ_k weight_k e^-D_k [1, φ], (b, columns), at z (b, N²)."""
+    def sums(self, z: Real) -> Real:
+        """Return Σ_k weight_k e^-D_k [1, φ], (b, 1 + N²), at z (b, N²)."""
         step = max(1, CACHE // self._exponents)
-        parts = [self._block(z[i : i + step], columns) for i in range(0, max(1, len(z)), step)]
+        parts = [self._block(z[i : i + step]) for i in range(0, max(1, len(z)), step)]
         return np.concatenate(parts)
 
-    def _block(self, z: Real, columns: int) -> Real:
+    def _block(self, z: Real) -> Real:
         """Return the sums at few z (b, N²)."""
         D = z @ -self._phi.T
-        return np.asarray(np.exp(D, out=D) @ self._terms[:, :columns])
+        return np.asarray(np.exp(D, out=D) @ self._terms)
 
 
 class SquareSum(ClassSum):
@@ -155,7 +119,7 @@ class SquareSum(ClassSum):
     values of each, 2 L exponentials in place of L². The results differ by rounding only.
 
     >>> classes, z = difference_classes("16qam", 2), np.array([[1.0, 2.0, 0.3, -0.2]])
-    >>> bool(np.isclose(SquareSum(classes).value(z), ClassSum(classes).value(z), rtol=1e-12))
+    >>> bool(np.allclose(SquareSum(classes).sums(z), ClassSum(classes).sums(z), rtol=1e-12))
     True
     """
 
@@ -174,7 +138,7 @@ class SquareSum(ClassSum):
         self._rest_features = features(self._rest)
         self._exponents = 2 * len(values) * len(self._rest)
 
-    def _block(self, z: Real, columns: int) -> Real:
+    def _block(self, z: Real) -> Real:
         """Return the sums at few z (b, N²).
 
         Z is positive semidefinite, |Z_1j|² <= Z_11 Z_jj: however weak the first stream is, no term
@@ -192,17 +156,15 @@ class SquareSum(ClassSum):
         # Z_11 (u + w)² of either part of u_1, by powers of it.
         D = np.stack([-inverse * row**2, -2.0 * row, np.broadcast_to(-own, row.shape)])
         D = self._squares.T @ D.reshape(3, -1)
-        moments = self._powers[: min(3, columns)] @ np.exp(D, out=D)
+        moments = self._powers @ np.exp(D, out=D)
         x, y = moments.reshape(len(moments), *row.shape).swapaxes(0, 1)
         schur = z[:, among] - inverse * coordinates(Z_1r.conj()[:, :, None] * Z_1r[:, None, :])
         x *= np.exp(-(schur @ self._rest_features.T)) * self._weights
 
         near = np.exp(-own * self._alone) @ self._alone_terms
         total = x[0] * y[0]
-        sums = np.empty((len(z), columns))
+        sums = np.empty((len(z), 1 + N * N))
         sums[:, 0] = np.sum(total, axis=1) + near[:, 0]
-        if columns == 1:
-            return sums
         with_first = 2.0 * ((x[1] * y[0] + 1j * x[0] * y[1]) @ self._rest.conj())
         sums[:, 1] = np.sum(x[2] * y[0] + x[0] * y[2], axis=1) + near[:, 1]
         sums[:, 1 + first], sums[:, 1 + first + pairs] = with_first.real, with_first.imag

@@ -19,7 +19,7 @@ from faao_mav.optimizer.pricing import fresh_rates, price, saturation
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.straight import straight_flight
-from faao_mav.optimizer.solution import load_solution, save_solution
+from faao_mav.optimizer.solution import Rates, load_solution, save_solution
 from faao_mav.plan import Plan, read_plan
 from faao_mav.radio.relay import RelayQueue
 
@@ -148,7 +148,7 @@ def test_plans_for_the_mutual_information(small_plan: MakePlan, tmp_path: Path) 
     save_solution(planned, tmp_path / "result.npz")
     loaded = load_solution(tmp_path / "result.npz")
     assert loaded.gain == planned.gain
-    assert loaded.recomputed() == planned.rates
+    assert Rates.of(*loaded.recomputed_slots()) == planned.rates
     gaussian = optimize(
         plan_of(small_plan, {"radio.fading": "none", "optimizer.inputs": "gaussian"})
     )

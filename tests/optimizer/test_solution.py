@@ -15,7 +15,7 @@ from faao_mav import files
 from faao_mav.errors import InputError
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.pricing import SATURATED, price, saturation
-from faao_mav.optimizer.solution import Solution, load_solution, save_solution
+from faao_mav.optimizer.solution import Rates, Solution, load_solution, save_solution
 from faao_mav.workflow import Result
 
 FEW = {"radio.fading": "realization", "optimizer.starts": ["straight"]}
@@ -170,5 +170,5 @@ def test_spare_power_is_what_could_be_saved(solution: Solution, small_plan: Make
     assert limit.saturated
     assert limit.ceiling == 2
     assert 5 < limit.spare_db < 40
-    at_limit = found.recomputed(10 ** (-limit.spare_db / 10)).R_avg
+    at_limit = Rates.of(*found.recomputed_slots(10 ** (-limit.spare_db / 10))).R_avg
     assert 0 <= at_limit - SATURATED * 2 < 1e-5

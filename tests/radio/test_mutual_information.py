@@ -59,7 +59,7 @@ def test_between_cutoff_rate_and_ceilings(
     gram = np.swapaxes(H @ P, 1, 2).conj() @ (H @ P) / noise
     gaussian = np.linalg.slogdet(np.eye(antennas) + gram)[1].mean() / np.log(2.0)
     slack = 0.02 * min(1.0, gaussian) + 1e-12
-    assert cutoff_rate(H, P, classes, noise).mean() - slack <= mean
+    assert cutoff_rate(H, P, modulation, noise).mean() - slack <= mean
     assert mean <= min(classes.bits + 1e-9, gaussian + slack)
 
 

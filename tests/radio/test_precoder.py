@@ -93,7 +93,7 @@ def test_arrays_agree_with_the_positions_of_their_elements() -> None:
         receivers = path + np.arange(3)[:, None] * east
         way = np.linalg.norm(receivers[:, None] - transmitters, axis=-1)
         expected = np.exp(-2j * np.pi * (way - way[0, 0]) / wavelength)
-        H = line_of_sight_ula(path, 3, 2)
+        H = line_of_sight_ula(path[0] / np.linalg.norm(path), 3, 2)
         np.testing.assert_allclose(H, expected, atol=1e-4)
         assert np.abs(H - expected.conj()).max() > 0.5  # the other sign would not pass
 

@@ -67,7 +67,7 @@ def test_the_plan_itself_delivers_the_plan_and_fresh_fading_too(solution: Soluti
         d2 = np.sum((w[n] - link.gains.station) ** 2) + link.gains.height**2
         H_r = link.small_scale(w)[..., n, :, :]
         H = np.sqrt(solution.plan.radio.reference_gain / d2) * H_r
-        expected = cutoff_rate(H, solution.P_B[..., n, :, :], link.classes, link.noise)
+        expected = cutoff_rate(H, solution.P_B[..., n, :, :], link.modulation, link.noise)
         assert np.mean(expected) == pytest.approx(I_U[n])
     assert np.abs(I_U - solution.I_U).max() > 1e-4
     fresh = fresh_rates(solution)
