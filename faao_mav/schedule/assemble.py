@@ -159,7 +159,7 @@ def way_between(plan: Plan, start: Real, end: Real) -> Real | None:
     fence, margin = plan.keep_in, plan.margin
     if fence is None or (kept := _kept(fence, margin)).covers_path(np.array([start, end])):
         return np.array([start, end])
-    begin = start
+    before, begin = [], start
     if not kept.covers(start[None]).all():
         within = fence.inside(margin)
         if within.empty:
@@ -167,8 +167,9 @@ def way_between(plan: Plan, start: Real, end: Real) -> Real | None:
         begin = within.nearest(start, end)
         if not fence.covers_path(np.array([start, begin])):
             return None
+        before = [start]
     way = _way(fence, margin, begin, end)
-    return None if way is None else np.vstack([start[None], way])
+    return None if way is None else np.array([*before, *way])
 
 
 def check_run_in(plan: Plan, route: Route) -> None:
@@ -192,14 +193,12 @@ def check_run_in(plan: Plan, route: Route) -> None:
 
 def _corners(plan: Plan, start: Real, end: Real, name: str) -> Real:
     fence, margin = plan.keep_in, plan.margin
-    if fence is None:
-        return np.empty((0, 2))
-    if not _kept(fence, margin).covers(np.zeros((1, 2))).all():
+    if fence is not None and not _kept(fence, margin).covers(np.zeros((1, 2))).all():
         raise InputError(
             f"{plan.source}: site.origin: home, where the mission takes off, is "
             f"{trouble(plan, (0.0, 0.0))}"
         )
-    way = _way(fence, margin, start, end)
+    way = way_between(plan, start, end)
     if way is None:
         raise InfeasibleError(
             f"{edge_of(plan)}: no way leads from {name} that keeps {margin:g} m "

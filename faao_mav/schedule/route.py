@@ -6,6 +6,7 @@ how the vehicle speeds up or turns: the schedulers fit it to the predicted fligh
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -88,21 +89,13 @@ class Route:
         `speeds` (k,), m/s, are those of the legs that begin there; behind the last waypoint, of the
         leg that ends there. `first` and `last` stay with their waypoints.
         """
-
-        def longer(array: Real, values: Real | float) -> Real:
-            return np.insert(array, np.minimum(at, len(array)), values, axis=0)
-
-        return Route(
-            positions=longer(self.positions, positions),
-            arrivals=longer(self.arrivals, times),
-            departures=longer(self.departures, times),
-            speeds=longer(self.speeds, speeds),
-            waits=longer(self.waits, 0.0),
-            radii=longer(self.radii, 0.0),
-            first=self.first + int(np.sum(at <= self.first)),
-            last=self.last + int(np.sum(at <= self.last)),
-            lead=self.lead,
-        )
+        new = {"positions": positions, "speeds": speeds, "arrivals": times, "departures": times}
+        longer: dict[str, Any] = {}
+        for name, values in (new | {"waits": 0.0, "radii": 0.0}).items():
+            old = getattr(self, name)
+            longer[name] = np.insert(old, np.minimum(at, len(old)), values, axis=0)
+        first, last = (end + int(np.sum(at <= end)) for end in (self.first, self.last))
+        return replace(self, first=first, last=last, **longer)
 
 
 def sent_speeds(speeds: Real, max_speed: float) -> Real:
@@ -217,14 +210,9 @@ def _timed(t: Real, waypoints: list[Waypoint], slowest: float, max_speed: float)
     )
 
 
-def _end_velocities(t: Real, w: Real) -> tuple[Real, Real]:
-    """Return the velocities (2,), m/s, at which the plan begins and ends.
+def _end_velocities(t: Real, w: Real) -> Real:
+    """Return the velocities (2, 2), m/s, at which the plan begins and ends.
 
     Of second order: the mean over the first slot is not 0 for a plan that speeds up from rest.
     """
-    if len(t) < 3:
-        between = (w[-1] - w[0]) / (t[-1] - t[0])
-        return between, between
-    first = np.gradient(w[:3], t[:3], axis=0, edge_order=2)[0]
-    last = np.gradient(w[-3:], t[-3:], axis=0, edge_order=2)[-1]
-    return first, last
+    return np.asarray(np.gradient(w, t, axis=0, edge_order=2 if len(t) > 2 else 1)[[0, -1]])

@@ -25,9 +25,9 @@ from faao_mav.autopilot import FlightPath, Model, Vehicle
 from faao_mav.autopilot.vehicle_type import OVERSPEED
 from faao_mav.errors import InputError
 from faao_mav.plan import Vector
-from faao_mav.schedule.prediction import PASSING_WINDOW, Schedule, positions_at
+from faao_mav.schedule.prediction import LATE_WEIGHT, PASSING_WINDOW, Schedule, positions_at
 from faao_mav.schedule.route import Route, sent_speeds
-from faao_mav.schedule.timing import SHORTEST_HOLD, Goal, Retimed, Unknowns, stepped
+from faao_mav.schedule.timing import SHORTEST_HOLD, Retimed, Unknowns, stepped
 from faao_mav.schedule.waypoints import SHORTEST_HOVER
 from faao_mav.vector import lengths
 
@@ -37,6 +37,7 @@ ALLOWED_ERROR = 0.8
 
 _WORTHWHILE = 0.95  # the largest ratio of the costs after and before a change that is kept
 _LEAST_GAIN = 0.1  # the share of the sum of squares that a flight saves for another one to follow
+_SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
 _ALIKE = 0.1  # the relative difference of neighbours' speeds that are tried as one
 
 # The shortest wait of a copter at the first waypoint, s. After a hold of 1 s ArduCopter is still
@@ -98,29 +99,35 @@ class Scheduler(ABC):
         )
         return Schedule(route, self.model.fly(path), self.t, self.w, self.tolerance)
 
-    def fitted(self, route: Route, top_speed: float, *, groups: Integers | None = None) -> Schedule:
+    def fitted(self, route: Route, *, groups: Integers | None = None) -> Schedule:
         """Return the flight of `route` with the speeds, the waits and the lead that fit best.
 
-        No speed is above `top_speed`, m/s; legs with the same number in `groups` share one.
+        Legs with the same number in `groups` share a speed.
         """
         if len(route.speeds) == 0:
             return self.flight(route)
+        samples = np.unique(np.linspace(0, len(self.t) - 1, _SAMPLES).astype(int))
+        t, w = self.t[samples], self.w[samples]
+
+        def missed(flown: Schedule) -> float:  # as `Schedule.error` squared, of the samples
+            apart = lengths(flown.positions(t) - w)
+            return float(np.mean(apart**2)) + (LATE_WEIGHT * flown.late) ** 2
+
         groups = np.arange(len(route.speeds)) if groups is None else groups
-        unknowns, goal = Unknowns(route, groups, self.min_speed, top_speed), Goal(self.t, self.w)
+        unknowns = Unknowns(route, groups, self.min_speed, self.max_speed)
         x = unknowns.initial
         best = self.flight(unknowns.commanded(x))
-        cost = goal.cost(best)
-        before = math.inf
+        before, cost = math.inf, missed(best)
         while cost < (1 - _LEAST_GAIN) * before:
             known = self.model.leg_durations(best.route.leg_lengths, best.route.joined)
-            tried, foreseen = stepped(goal, unknowns, Retimed(best, known), x)
+            tried, foreseen = stepped(t, w, unknowns, Retimed(best, known), x)
             if foreseen > (1 - _LEAST_GAIN) * cost:
                 break
             try:
                 flown = self.flight(unknowns.commanded(tried))
             except InputError:  # it is not followed to its end
                 break
-            before, now = cost, goal.cost(flown)
+            before, now = cost, missed(flown)
             if now >= before:
                 break
             x, best, cost = tried, flown, now
@@ -132,24 +139,23 @@ class Scheduler(ABC):
         positions = positions_at(times, self.t, self.w)
         return route.insert(at, positions, times, route.speeds[at - 1])
 
-    def shared(self, schedule: Schedule, top_speed: float) -> Schedule:
-        """Return `schedule` with one speed for neighbouring legs wherever that hardly costs."""
-        groups = _speed_groups(schedule.route.speeds)
-        if len(groups) == 0 or groups[-1] == len(groups) - 1:
-            return schedule
-        shared = self.fitted(schedule.route, top_speed, groups=groups)
-        most = max(schedule.cost / _WORTHWHILE, ALLOWED_ERROR / 2)
-        return shared if shared.cost <= most else schedule
+    def sent(self, schedule: Schedule) -> Schedule:
+        """Return `schedule` with the values that are sent, and a last wait to the plan's end.
 
-    def rounded(self, schedule: Schedule, top_speed: float) -> Schedule:
-        """Return `schedule` with the values that are sent, and a last wait to the plan's end."""
+        Neighbouring legs have one speed wherever that hardly costs.
+        """
+        groups = _speed_groups(schedule.route.speeds)
+        if len(groups) and groups[-1] < len(groups) - 1:
+            shared = self.fitted(schedule.route, groups=groups)
+            if shared.cost <= max(schedule.cost / _WORTHWHILE, ALLOWED_ERROR / 2):
+                schedule = shared
         route = schedule.route
         waits = route.waits.copy()
         if route.last == len(waits) - 1:  # it ends at rest, and the plan with its last slot
             end = 2 * self.t[-1] - self.t[-2]
             early = end + schedule.start - schedule.flown.arrivals[-1]
             waits[-1] = max(SHORTEST_HOLD, np.ceil(early))
-        speeds = sent_speeds(route.speeds, top_speed)
+        speeds = sent_speeds(route.speeds, self.max_speed)
         return self.flight(replace(route, speeds=speeds, waits=waits))
 
     def _with_radii(self, route: Route) -> Route:
@@ -186,20 +192,20 @@ class CopterScheduler(Scheduler):
         waits[0] = max(waits[0], _FIRST_WAIT)
         if route.last == len(waits) - 1:  # it ends at rest, and takes that long to come to it
             waits[-1] = max(waits[-1], SHORTEST_HOVER)
-        return self.fitted(replace(route, waits=waits), self.max_speed)
+        return self.fitted(replace(route, waits=waits))
 
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with more legs where it is off, and values as they are sent."""
-        best, top_speed = first, self.max_speed
-        if best.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
-            top_speed *= OVERSPEED
-            best = self.fitted(best.route, top_speed)
+        quick, best = self, first
+        if first.error > ALLOWED_ERROR:  # corners cost time that only speed makes up for
+            quick = replace(self, max_speed=OVERSPEED * self.max_speed)
+            best = quick.fitted(first.route)
         while len(times := self._split_times(best)):
-            tried = self.fitted(self._split(best.route, times), top_speed)
+            tried = quick.fitted(self._split(best.route, times))
             if tried.cost > _WORTHWHILE * best.cost:
                 break
             best = tried
-        return self.rounded(self.shared(best, top_speed), top_speed)
+        return quick.sent(best)
 
     def _split(self, route: Route, times: Real) -> Route:
         """Return the route with waypoints more where the plan is at the `times` (k,), s.
@@ -311,6 +317,5 @@ class PlaneScheduler(Scheduler):
             kept = self._kept(tried[-1].route).route
             if len(tried) > 1 and np.array_equal(kept.positions, tried[-1].route.positions):
                 break  # the waypoints are where they were, and so would be the speeds
-            tried.append(self.fitted(kept, self.max_speed))
-        best = min(tried, key=lambda each: each.cost)
-        return self.rounded(self.shared(best, self.max_speed), self.max_speed)
+            tried.append(self.fitted(kept))
+        return self.sent(min(tried, key=lambda each: each.cost))

@@ -29,7 +29,6 @@ from faao_mav.vector import lengths
 MOST_LEAD = 2.0  # the longest time by which the aircraft sets out before the plan, s
 SHORTEST_HOLD = 1.0  # the shortest wait at a hover, s: untold to wait, an autopilot flies through
 
-_SAMPLES = 240  # the most instants at which a predicted flight is compared with the plan
 _STEPS = 8  # the most steps with one flight retimed: far from it the slopes are others
 _SETTLED = 1e-3  # the share of the sum of squares that a step saves for another one to follow
 
@@ -161,81 +160,54 @@ class Unknowns:
     """
 
     def __init__(self, route: Route, groups: Integers, min_speed: float, max_speed: float) -> None:
-        free = route.waits > 0
-        free[[0, -1]] = False
-        self._route, self._groups, self._free = route, groups, free
+        free = 1 + np.flatnonzero(route.waits[1:-1] > 0)
+        legs, waits = len(groups), len(free)
         means = np.bincount(groups, route.speeds) / np.bincount(groups)
-        self._speeds, waits = len(means), int(free.sum())
         most_lead = MOST_LEAD if route.first == 0 else 0.0
         slowest, fastest = np.full((2, len(means)), [[min_speed], [max_speed]])
         self.low = np.concatenate([slowest, np.full(waits, SHORTEST_HOLD), [0.0]])
         self.high = np.concatenate([fastest, np.full(waits, np.inf), [most_lead]])
         begin = np.concatenate([means, route.waits[free], [route.lead]])
         self.initial = np.clip(begin, self.low, self.high)
-        self.chain = np.zeros((2 * len(free), len(begin)))
-        self.chain[np.arange(len(groups)), groups] = 1.0
-        self.chain[len(groups) + np.flatnonzero(free), self._speeds + np.arange(waits)] = 1.0
+        self.chain = np.zeros((2 * legs + 2, len(begin)))
+        self.chain[np.arange(legs), groups] = 1.0
+        self.chain[legs + free, len(means) + np.arange(waits)] = 1.0
         self.chain[-1, -1] = 1.0
+        told = np.concatenate([np.zeros(legs), route.waits, [0.0]])
+        self._route, self._fixed = route, np.where(self.chain.any(axis=1), 0.0, told)
 
     def commanded(self, x: Real) -> Route:
         """Return the route with the speeds, waits and lead of `x`."""
-        waits = self._route.waits.copy()
-        waits[self._free] = x[self._speeds : -1]
-        return replace(self._route, speeds=x[self._groups], waits=waits, lead=float(x[-1]))
+        speeds, waits, lead = np.split(self._fixed + self.chain @ x, [len(self._route.speeds), -1])
+        return replace(self._route, speeds=speeds, waits=waits, lead=float(lead[0]))
 
     def reached(self, x: Real, limits: Real) -> Real:
         """Return `x` with no speed above the greatest of its legs' `limits` (m - 1,), m/s."""
-        fastest = np.zeros(self._speeds)
-        np.maximum.at(fastest, self._groups, limits)
-        fastest = np.append(fastest, np.full(len(x) - self._speeds, np.inf))
-        within: Real = np.maximum(np.minimum(x, fastest), self.low)
-        return within
+        fastest = np.append(limits, np.full(len(self.chain) - len(limits), np.inf))
+        within = np.minimum(x, np.where(self.chain > 0, fastest[:, None], 0.0).max(axis=0))
+        return np.asarray(np.maximum(within, self.low))
 
 
-class Goal:
-    """The residuals whose sum of squares is least for a flight at `w` (n, 2), m, at `t` (n,), s."""
+def stepped(
+    t: Real, w: Real, unknowns: Unknowns, retimed: Retimed, begin: Real
+) -> tuple[Real, float]:
+    """Return the best `x` (k,) of the `retimed` flight from `begin` on, and what it misses, m².
 
-    def __init__(self, t: Real, w: Real) -> None:
-        samples = np.unique(np.linspace(0, len(t) - 1, _SAMPLES).astype(int))
-        self.t, self._w = t[samples], w[samples]
-        self._weight = 1 / np.sqrt(len(samples))
-
-    def residuals(self, positions: Real, late: float) -> Real:
-        """Return the residuals (r,), m, of a flight at `positions` (n, 2) that is `late` by s."""
-        apart = (positions - self._w) * self._weight
-        return np.append(apart.T, LATE_WEIGHT * late)
-
-    def cost(self, schedule: Schedule) -> float:
-        """Return the sum of squares, m², of a flight."""
-        residuals = self.residuals(schedule.positions(self.t), schedule.late)
-        return float(residuals @ residuals)
-
-    def slopes(self, velocities: Real, later: Real) -> Real:
-        """Return what the unknowns do to the residuals of a flight at `velocities` (n, 2), (r, k).
-
-        `later` (n + 1, k), s, is by how much later they make the flight, in the end by its last
-        row.
-        """
-        moved = velocities.T * self._weight
-        apart = -(moved[:, :, None] * later[:-1]).reshape(-1, later.shape[1])
-        slopes: Real = np.vstack([apart, LATE_WEIGHT * later[-1:]])
-        return slopes
-
-
-def stepped(goal: Goal, unknowns: Unknowns, retimed: Retimed, begin: Real) -> tuple[Real, float]:
-    """Return the best `x` (k,) of the `retimed` flight from `begin` on, and its cost, m²."""
-    low, high = unknowns.low, unknowns.high
+    That is `Schedule.error` squared of the instants `t` (n,), s, with the plan at `w` (n, 2), m.
+    """
+    low, high, weight = unknowns.low, unknowns.high, 1 / np.sqrt(len(t))
 
     def flown(x: Real) -> tuple[Real, Integers, Real, float]:
-        positions, velocities, samples, late = retimed.at(goal.t, unknowns.commanded(x))
-        residuals = goal.residuals(positions, late)
+        positions, velocities, samples, late = retimed.at(t, unknowns.commanded(x))
+        residuals = np.append(weight * (positions - w).T, LATE_WEIGHT * late)
         return velocities, samples, residuals, float(residuals @ residuals)
 
     x, damping = unknowns.reached(begin, retimed.limits), 1e-3
     velocities, samples, residuals, cost = flown(x)
     for _ in range(_STEPS):
         later = retimed.slopes(unknowns.commanded(x), samples) @ unknowns.chain
-        slopes = goal.slopes(velocities, later)
+        moved = -weight * velocities.T[:, :, None] * later[:-1]
+        slopes = np.vstack([moved.reshape(-1, len(x)), LATE_WEIGHT * later[-1:]])
         gradient = residuals @ slopes
         stuck = ((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0))
         slopes[:, stuck] = 0.0

@@ -219,18 +219,15 @@ def _last_within(w: Real, radius: float) -> int:
 
 def _longest_legs(w: Real, tolerance: float) -> list[int]:
     """Return the indices at which legs end if each is as long as `tolerance` (m) allows."""
-    ends: list[int] = []
-    first, last = 0, len(w) - 1
-    while True:
-        strays = partial(_strays, w, tolerance, first)
-        step = 1
+    ends, first, last = list[int](), 0, len(w) - 1
+    while first < last:
+        strays, step = partial(_strays, w, tolerance, first), 1
         while first + step < last and not strays(min(first + 2 * step, last)):
-            step = min(2 * step, last - first)
-        if first + step >= last:
-            return ends
+            step *= 2
         farther = range(first + step + 1, min(first + 2 * step, last))
         first += step + bisect_left(farther, True, key=strays)
         ends.append(first)
+    return ends[:-1]
 
 
 def _strays(w: Real, tolerance: float, first: int, last: int) -> bool:

@@ -156,7 +156,7 @@ def as_planned(route: Route, *, ahead: float = 0.0) -> CopterScheduler:
 
 
 def fitted(scheduler: CopterScheduler, begin: Route, **options: Any) -> Schedule:
-    return scheduler.fitted(begin, scheduler.max_speed, **options)
+    return scheduler.fitted(begin, **options)
 
 
 GUESS = route_with(np.full(4, 5.0), np.where(WAITS > 5, 8.0, WAITS))
