@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -34,8 +34,8 @@ class _Asked:
     )
     points: int | None = cli.option("N", "Points of the frontier; without it 12.", min=2)
 
-    def cases(self, plan: "Plan") -> "tuple[Sequence[StudyCase], str | None]":
-        """Return the cases of a plan, and the key that a frontier varies, None for any other study.
+    def cases(self, plan: "Plan") -> "Sequence[StudyCase]":
+        """Return the cases of a plan.
 
         Raises `PlanError` for values that no case can use; some may fail and become rows.
         """
@@ -43,29 +43,25 @@ class _Asked:
         from faao_mav.plan.keys import POWER, varied_twice
         from faao_mav.plan.sections import Study
         from faao_mav.study import make_cases, parse_vary
-        from faao_mav.study.sweep import frontier_cases, parse_frontier, parse_schemes, parse_values
+        from faao_mav.study.sweep import frontier_cases, parse_schemes, parse_values
 
         options = [parse_vary(text) for text in self.vary or []]
         if self.power is not None:
             options.append((POWER, parse_values(self.power, "--power")))
         if both := varied_twice(key for key, _ in options):
             raise InputError(f"--vary {both}: varied twice; give all values in one option")
-        grid, along, asked = dict(options), None, plan.study or Study()
-        if self.frontier is not None:
-            if grid or self.schemes is not None or self.seeds is not None:
-                raise InputError("--frontier: leave --vary, --power, --schemes and --seeds out")
-            along = parse_frontier(self.frontier)
-            cases = frontier_cases(plan, along, self.points or _POINTS)
-        elif self.points is not None:
+        if self.points is not None and self.frontier is None:
             raise InputError(f"--points {self.points}: is for a frontier; give --frontier too")
+        asked = plan.study or Study()
+        grid: dict[str, Any] = {
+            "vary": dict(options) if options or self.frontier else asked.vary,
+            "schemes": asked.schemes if self.schemes is None else parse_schemes(self.schemes),
+            "seeds": self.seeds or asked.seeds,
+        }
+        if self.frontier is not None:
+            cases = frontier_cases(plan, self.frontier, self.points or _POINTS, **grid)
         else:
-            cases = make_cases(
-                plan.text,
-                vary=grid or asked.vary,
-                schemes=asked.schemes if self.schemes is None else parse_schemes(self.schemes),
-                seeds=self.seeds or asked.seeds,
-                source=plan.source,
-            )
+            cases = make_cases(plan.text, source=plan.source, **grid)
         refused = []
         for case in cases:
             try:
@@ -73,7 +69,7 @@ class _Asked:
             except PlanError as error:
                 refused.append(error)
             else:
-                return cases, along
+                return cases
         raise refused[0]
 
 
@@ -100,13 +96,15 @@ def study(
     from faao_mav.plan.sections import Study
     from faao_mav.report.style import save_figure
     from faao_mav.study import run_study
-    from faao_mav.study.figure import frontier_figure, frontier_table, study_figure
+    from faao_mav.study.figure import study_figure
     from faao_mav.study.rows import as_dict, comparison
 
     if jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for one a core")
     plan = read_plan(plan_file)
-    cases, along = asked.cases(plan)
+    cases, kind = asked.cases(plan), (plan.study or Study()).figure
+    if asked.frontier is not None and kind != "trajectories":
+        kind = "data"
     try:
         with cli.progress() as draw:
             done = itertools.count(1)
@@ -123,16 +121,16 @@ def study(
         raise typer.Exit(_INTERRUPTED) from None
     written = []
     if out is not None:
-        written, kind = [out / "rows", out / "table.csv"], (plan.study or Study()).figure
+        written = [out / "rows", out / "table.csv"]
         try:
-            figure = frontier_figure(rows, plan, along) if along else study_figure(rows, plan, kind)
+            figure = study_figure(rows, plan, kind)
         except InputError:
             pass  # there is nothing to draw
         else:
             for path in (out / "figure.svg", out / "figure.png"):
                 save_figure(figure, path)
                 written.append(path)
-    text = frontier_table(rows, plan, along) if along else comparison(rows)
+    text = comparison(rows, data=asked.frontier is not None or kind == "data")
     cli.show(
         lambda: {"rows": [as_dict(row) for row in rows], "written": written},
         lambda: [text, *(f"written      {path}" for path in written)],

@@ -248,4 +248,4 @@ class Study:
     )
     schemes: Annotated[tuple[StudyScheme, ...], Field(min_length=1)] = ("faao",)
     seeds: Whole = 1
-    figure: Literal["delivered", "rate", "trajectories"] = "delivered"
+    figure: Literal["delivered", "rate", "data", "trajectories"] = "delivered"

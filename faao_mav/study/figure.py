@@ -1,7 +1,4 @@
-"""What a study shows: rates along what is varied, routes on a map, and a frontier.
-
-A frontier is the most data for every duration, power or energy.
-"""
+"""What a study shows: rates or data along what is varied, or routes on a map."""
 
 import itertools
 import json
@@ -16,7 +13,7 @@ from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.plan.keys import POWER
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
-from faao_mav.study.rows import StudyRow, failures, spread
+from faao_mav.study.rows import StudyRow, spread, unit_of_data
 from faao_mav.study.sweep import ENERGY, Value
 
 if TYPE_CHECKING:
@@ -26,6 +23,7 @@ if TYPE_CHECKING:
 _KEYS = {
     POWER: ("power W of both stations, dBm", "W", " dBm"),
     "flight.duration": ("duration T, s", "T", " s"),
+    ENERGY: ("energy, Wh", "E", " Wh"),
     "flight.altitude": ("height H, m", "H", " m"),
     "radio.rician_factor": ("Rician factor K", "K", ""),
     "radio.modulation": ("", "", ""),
@@ -44,11 +42,12 @@ _OF_CAUSALITY = (
 )
 """Name of each of these lines, the value of the key, and the field of a row that is drawn."""
 
-_AMOUNTS = {"flight.duration": "duration, s", POWER: "power, dBm", ENERGY: "energy, Wh"}
-"""What a frontier's axis and the column of its table are called."""
-
-_DRAWN = {"rate": ("R_avg", "rate R_avg"), "delivered": ("delivered", "delivered rate R_del")}
-"""The field of a row that a kind of figure draws, and the label of its axis."""
+_DRAWN = {
+    "rate": ("R_avg", "rate R_avg, bit/s/Hz"),
+    "delivered": ("delivered", "delivered rate R_del, bit/s/Hz"),
+    "data": ("data", "delivered, {}"),
+}
+"""What of a row a kind of figure draws, and the label of its axis, with the unit of data."""
 
 _SCHEMES = {
     "faao": "FAAO",
@@ -63,7 +62,7 @@ _SCHEMES = {
 
 
 def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
-    """Return the figure `kind` of `rows`: `delivered`, `rate` (R_avg) or `trajectories`.
+    """Return the figure `kind` of `rows`: `delivered`, `rate` (R_avg), `data` or `trajectories`.
 
     Raises `InputError` where there is nothing to draw: no result, or for rates no axis of numbers.
 
@@ -85,7 +84,7 @@ def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
 
 
 def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str, axis: str) -> "Figure":
-    """Draw a rate over the axis: a line for each scheme, a panel for each of the other values."""
+    """Draw what came out over the axis: a line a scheme, a panel for each of the other values."""
     panels: dict[str, list[StudyRow]] = {}
     for row in rows:
         others = {key: row.values[key] for key in row.values if key not in (axis, _CAUSAL)}
@@ -93,13 +92,14 @@ def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str, axis: str) -> "Figur
     across = min(len(panels), 3)
     down = -(-len(panels) // across)
     width, height = (5.4, 3.4) if across == 1 else (3.3 * across, 2.9)
-    unit = "rate" if _CAUSAL in rows[0].values else _DRAWN[kind][1]
+    measure, unit = _DRAWN[kind]
+    unit = "rate, bit/s/Hz" if _CAUSAL in rows[0].values else unit.format(unit_of_data(rows))
     with drawing(width, 0.5 + height * down) as figure:
         plots = figure.subplots(down, across, squeeze=False, sharex=True).ravel().tolist()
         for plot, (name, inside) in zip(plots, panels.items(), strict=False):
-            _lines(plot, inside, axis, _DRAWN[kind][0])
-            title = name or plan.name or "rate by scheme"
-            label(plot, title, _KEYS.get(axis, (axis,))[0], f"{unit}, bit/s/Hz")
+            _lines(plot, inside, axis, measure)
+            title = name or plan.name or "study"
+            label(plot, title, _KEYS.get(axis, (axis,))[0], unit)
             plot.tick_params(labelbottom=True)  # the plot beneath may be none
         for plot in plots[len(panels) :]:
             plot.remove()
@@ -153,20 +153,19 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
             width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
             plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
         figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
-        as_map(plot, plan, plan.name or "routes")
+        flight, t = plan.flight, plan.flight.time_step * np.arange(float(plan.flight.slots))
+        ways: list[Any] = [
+            *(each.at(t) for each in plan.radio.stations),
+            [flight.start],
+            [flight.end],
+        ]
+        places = list(zip(("base station", "user", "start", "end"), ways, "s^oo", strict=True))
+        plot.plot(*np.concatenate(ways).T, linestyle="none")
+        plot.set_aspect("equal", adjustable="datalim")
+        plot.margins(0.1)
+        label(plot, plan.name or "routes", "east, m", "north, m")
+        mark_stations(plot, places)
     return figure
-
-
-def as_map(plot: "Axes", plan: Plan, title: str) -> None:
-    """Make `plot`, whose figure has all else, a map with the stations and the ends of `plan`."""
-    flight, t = plan.flight, plan.flight.time_step * np.arange(float(plan.flight.slots))
-    ways: list[Any] = [*(each.at(t) for each in plan.radio.stations), [flight.start], [flight.end]]
-    places = list(zip(("base station", "user", "start", "end"), ways, "s^oo", strict=True))
-    plot.plot(*np.concatenate(ways).T, linestyle="none")
-    plot.set_aspect("equal", adjustable="datalim")
-    plot.margins(0.1)
-    label(plot, title, "east, m", "north, m")
-    mark_stations(plot, places)
 
 
 def _named(values: Mapping[str, Value]) -> str:
@@ -179,59 +178,3 @@ def _named(values: Mapping[str, Value]) -> str:
         name, unit = _KEYS.get(key, ("", key.rsplit(".", 1)[-1], ""))[1:]
         parts.append(f"{name} = {text}{unit}" if name else text + unit)
     return ", ".join(parts)
-
-
-def pareto(rows: Sequence[StudyRow], key: str) -> tuple[StudyRow, ...]:
-    """Return the rows than which none delivers as much for less, by rising values of `key`."""
-    best: list[StudyRow] = []
-    delivering = [row for row in rows if row.delivered is not None]
-    for row in sorted(delivering, key=lambda row: (float(row.values[key]), -_data(row))):
-        if not best or _data(row) > _data(best[-1]):
-            best.append(row)
-    return tuple(best)
-
-
-def _data(row: StudyRow, time_step: float = 1.0) -> float:
-    """Return what a row delivers, megabytes, or without a bandwidth bit/Hz in slots of such s."""
-    if row.delivered_mbytes is not None:
-        return row.delivered_mbytes
-    return (row.delivered or 0.0) * len(row.route) * time_step
-
-
-def _delivered(plan: Plan) -> str:
-    return f"delivered, {'bit/Hz' if plan.radio.bandwidth_mhz is None else 'megabytes'}"
-
-
-def frontier_table(rows: Sequence[StudyRow], plan: Plan, key: str) -> str:
-    """Return the points of the frontier as lines of the terminal."""
-    lines = [f"{_AMOUNTS[key]:>12}  {_delivered(plan):>20}  bit/s/Hz"]
-    lines += [
-        f"{row.values[key]:12g}  {_data(row, plan.flight.time_step):20.4g}  {row.delivered:8.4f}"
-        for row in pareto(rows, key)
-    ]
-    return "\n".join([*lines, *failures(rows, "point")])
-
-
-def frontier_figure(rows: Sequence[StudyRow], plan: Plan, key: str) -> "Figure":
-    """Return the figure of the frontier: the curve, and the route of each of its points.
-
-    Raises `InputError` where no row has a result.
-    """
-    from matplotlib import colormaps
-
-    best = pareto(rows, key)
-    if not best:
-        raise InputError("nothing to draw: no result")
-    amounts = [_data(row, plan.flight.time_step) for row in best]
-    at = [float(row.values[key]) for row in best]
-    colours = colormaps["viridis"](np.linspace(0, 0.9, len(best)))
-    with drawing(9.6, 4.4) as figure:
-        curve, routes = figure.subplots(1, 2)
-        curve.plot(at, amounts, color="0.6", linewidth=1.2)
-        curve.scatter(at, amounts, color=colours, zorder=3)
-        curve.set_ylim(bottom=0)
-        label(curve, plan.name or "trade-off", _AMOUNTS[key], _delivered(plan))
-        for row, colour in zip(best, colours, strict=True):
-            routes.plot(*row.route.T, color=colour, linewidth=1.4)
-        as_map(routes, plan, "routes, in the colours of the curve")
-    return figure

@@ -42,8 +42,9 @@ class StudyRow:
 
     Rates and mutual information are bit/s/Hz, and `rate` names that which R_avg and all others are
     of, `optimizer.rate`; `delivered` is the delivered rate and
-    `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth. `seconds` is the
-    time of the optimiser. Where there is no result `error` says why and the numbers are None.
+    `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth; `duration` is
+    that of the flight, s, `seconds` the time of the optimiser. Where there is no result `error`
+    says why and the numbers are None.
     `route` is w (n, 2), m, one pair for each slot.
 
     >>> row = StudyRow("", {"flight.altitude": 60}, "faao", 0, R_avg=1.5, delivered=1.4)
@@ -62,6 +63,7 @@ class StudyRow:
     R_G: float | None = None
     delivered: float | None = None
     delivered_mbytes: float | None = None
+    duration: float | None = None
     mutual_information: float | None = None
     rate: str = "cutoff"
     seconds: float | None = None
@@ -71,6 +73,13 @@ class StudyRow:
     route: Annotated[Real, PlainValidator(_route)] = field(
         default_factory=lambda: np.empty((0, 2)), compare=False
     )
+
+    @property
+    def data(self) -> float | None:
+        """What a flight carries: `delivered_mbytes`, or without a bandwidth bit/Hz."""
+        if self.delivered_mbytes is not None or self.delivered is None or self.duration is None:
+            return self.delivered_mbytes
+        return self.delivered * self.duration
 
 
 _ROW: TypeAdapter[StudyRow] = TypeAdapter(StudyRow)
@@ -166,26 +175,28 @@ def spread(rates: Sequence[float]) -> float:
     return stdev(rates) if len(rates) > 1 else 0.0
 
 
-def failures(rows: Sequence[StudyRow], what: str = "row") -> list[str]:
-    """Return a line on how many of `rows` failed, and why the first did; none if none did."""
-    failed = [row.error for row in rows if row.error]
-    told = f"{len(failed)} of {counted(len(rows), what)} failed, first: "
-    return [told + failed[0]] if failed else []
+def unit_of_data(rows: Sequence[StudyRow]) -> str:
+    """Return the unit of the `data` of `rows`, all with a bandwidth or all without."""
+    return "bit/Hz" if all(row.delivered_mbytes is None for row in rows) else "megabytes"
 
 
-def comparison(rows: Sequence[StudyRow]) -> str:
-    """Return tables for people, of R_avg and of what is delivered, and what failed.
+def comparison(rows: Sequence[StudyRow], *, data: bool = False) -> str:
+    """Return tables for people, of R_avg, of what is delivered, and of `data`; and what failed.
 
     Values are down, schemes across, each cell has mean and spread over the seeds.
     """
-    text = [line for measure in ("R_avg", "delivered") for line in _compared(rows, measure)]
-    text += failures(rows)
+    of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
+    units = dict.fromkeys(("R_avg", "delivered"), f"bit/s/Hz{of_rate}")
+    units |= {"data": unit_of_data(rows)} if data else {}
+    text = [line for measure, unit in units.items() for line in _compared(rows, measure, unit)]
+    if failed := [row.error for row in rows if row.error]:
+        text.append(f"{len(failed)} of {counted(len(rows), 'row')} failed, first: {failed[0]}")
     if loose := sum(row.converged is False for row in rows):
         text.append(f"{loose} of {counted(len(rows), 'row')} did not converge")
     return "\n".join(text)
 
 
-def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
+def _compared(rows: Sequence[StudyRow], measure: str, unit: str) -> list[str]:
     schemes = list(dict.fromkeys(row.scheme for row in rows))
     found: dict[tuple[str, ...], dict[str, list[float]]] = {}
     for row in rows:
@@ -197,9 +208,8 @@ def _compared(rows: Sequence[StudyRow], measure: str) -> list[str]:
     lines = [[*(key.rsplit(".", 1)[-1] for key in varied), *schemes]]
     lines += [[*values, *map(_cell, rates.values())] for values, rates in found.items()]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    of_rate = " of mutual information" if all(row.rate != "cutoff" for row in rows) else ""
     table = ("  ".join(map(str.rjust, line, widths)) for line in lines)
-    return [f"{measure}, bit/s/Hz{of_rate}", *table]
+    return [f"{measure}, {unit}", *table]
 
 
 def _cell(rates: Sequence[float]) -> str:

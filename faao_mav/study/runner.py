@@ -39,6 +39,7 @@ def run_case(case: StudyCase) -> StudyRow:
         R_G=rates.R_G,
         delivered=solution.delivered_rate,
         delivered_mbytes=solution.plan.megabytes(solution.delivered_rate),
+        duration=solution.plan.flight.duration,
         mutual_information=information.average if information else None,
         rate=solution.plan.optimizer.rate,
         seconds=round(result.seconds_optimize, 3),

@@ -1,10 +1,10 @@
-"""The plans that a study runs: the grid of values, schemes and seeds, or a frontier."""
+"""The plans that a study runs: the grid of values, schemes and seeds, and what a frontier adds."""
 
 import hashlib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from importlib.metadata import version
 from typing import Any, TypeAlias, get_args
@@ -15,7 +15,7 @@ from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import dbm
-from faao_mav.plan.keys import ALIASES, POWER, not_varied
+from faao_mav.plan.keys import ALIASES, POWER, not_varied, varied_twice
 from faao_mav.plan.reader import changed
 from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
@@ -168,51 +168,44 @@ ENERGY = "goal.energy_wh"
 _DECIMALS = 4
 """Decimals of the energies of a frontier, Wh, which are rounded up. Chosen."""
 
-_FRONTIERS = {"duration": "flight.duration", "power": POWER, "energy": ENERGY}
-"""The key of the plan that each trade-off varies."""
 
+def frontier_cases(plan: Plan, frontier: str, points: int, **grid: Any) -> tuple[StudyCase, ...]:
+    """Return the cases of `grid`, see `make_cases`, at the `points` of a `frontier` of a plan.
 
-def parse_frontier(text: str) -> str:
-    """Return the key that `--frontier AXIS,data` varies. Raises `InputError`.
-
-    >>> parse_frontier("power,data")
-    'power_dbm'
-    """
-    axis, _, of = text.partition(",")
-    if axis.strip() not in _FRONTIERS or of.strip() != "data":
-        accepted = " or ".join(f"{name},data" for name in _FRONTIERS)
-        raise InputError(f"--frontier {quote(text)}: expected {accepted}")
-    return _FRONTIERS[axis.strip()]
-
-
-def frontier_cases(plan: Plan, key: str, points: int) -> tuple[StudyCase, ...]:
-    """Return the cases of the most data at `points` values of `key`, the plan's own the last.
-
+    `duration,data`, `power,data` or `energy,data`: the most data for each, the plan's own the last.
     Durations are whole time steps from the shortest on. Powers rise by the same dB at both
-    stations, and the value is that of the base station, dBm. Energies, of flights of any duration
-    up to the plan's, rise from the straight flight's to that of the plan without a limit, which is
-    optimised for it. Raises `InputError` where the plan cannot be asked for energies.
+    stations; where they differ the value is that of the base station, dBm. Energies, of flights of
+    any duration up to the plan's, rise from the straight flight's to that of the plan without a
+    limit, which is optimised for it. Raises `InputError` for another frontier, and where the plan
+    cannot be asked for energies.
     """
-    data = load_yaml(plan.text, plan.source)
-    for section in ("goal", "study"):
-        data.pop(section, None)
-    cases = []
-    along = {"flight.duration": _durations, POWER: _powers, ENERGY: _energies}[key]
-    for changes in along(plan, points):
-        value = next(iter(changes.values()))
-        more = {"goal.maximise": "data"} if key == ENERGY else {}
-        text = dump_yaml(changed(data, changes | more))
-        scheme = plan.optimizer.precoder
-        cases.append(StudyCase(((key, value),), scheme, plan.radio.seed, text, plan.source))
-    return tuple(cases)
+    match frontier.replace(" ", "").split(","):
+        case ["duration", "data"]:
+            key, slots = "flight.duration", (fewest_slots(plan), plan.flight.slots)
+            times = np.unique(np.rint(np.linspace(*slots, points))) * plan.flight.time_step
+            along = [{key: time} for time in times.round(9).tolist()]
+        case ["power", "data"]:
+            given = dict(zip(ALIASES[POWER], map(dbm, plan.powers), strict=True))
+            key = POWER if len(set(plan.powers)) == 1 else next(iter(given))
+            down = np.linspace(-_DECIBELS, 0, points).round(3).tolist()
+            along = [{path: round(own + less, 6) for path, own in given.items()} for less in down]
+        case ["energy", "data"]:
+            key = ENERGY
+            along = [{key: value, "goal.maximise": "data"} for value in _energies(plan, points)]
+        case _:
+            accepted = "duration,data or power,data or energy,data"
+            raise InputError(f"--frontier {quote(frontier)}: expected {accepted}")
+    if both := varied_twice((key, *grid["vary"])):
+        raise InputError(f"--frontier {frontier}: {both} varied too; give one of both")
+    data = load_yaml(plan.text, plan.source) | {"goal": {}}
+    return tuple(
+        replace(case, values=((key, next(iter(changes.values()))), *case.values))
+        for changes in along
+        for case in make_cases(dump_yaml(changed(data, changes)), source=plan.source, **grid)
+    )
 
 
-def _durations(plan: Plan, points: int) -> list[dict[str, float]]:
-    slots = np.unique(np.rint(np.linspace(fewest_slots(plan), plan.flight.slots, points)))
-    return [{"flight.duration": round(n * plan.flight.time_step, 9)} for n in slots.tolist()]
-
-
-def _energies(plan: Plan, points: int) -> list[dict[str, float]]:
+def _energies(plan: Plan, points: int) -> list[float]:
     from faao_mav.optimizer.direct import direct
     from faao_mav.optimizer.goal import thriftiest_straight
     from faao_mav.optimizer.problem import build_problem
@@ -224,10 +217,4 @@ def _energies(plan: Plan, points: int) -> list[dict[str, float]]:
     least = thriftiest_straight(plan)[1] / JOULES_PER_WH
     assert most is not None
     values = np.linspace(min(least, most), most, points).round(_DECIMALS) + 10.0**-_DECIMALS
-    return [{ENERGY: value} for value in values.round(_DECIMALS).tolist()]
-
-
-def _powers(plan: Plan, points: int) -> list[dict[str, float]]:
-    given = dict(zip(ALIASES[POWER], map(dbm, plan.powers), strict=True))
-    down = np.linspace(-_DECIBELS, 0, points).round(3).tolist()
-    return [{key: round(own + less, 6) for key, own in given.items()} for less in down]
+    return [float(value) for value in values.round(_DECIMALS)]

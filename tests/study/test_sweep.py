@@ -1,6 +1,7 @@
 """What a study runs: values, grids, and the plans that they make; the trade-off of a plan."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,17 +14,9 @@ from typer.testing import CliRunner
 from faao_mav.cli.main import app
 from faao_mav.errors import InputError, PlanError
 from faao_mav.plan import parse_plan, read_plan
-from faao_mav.plan.keys import POWER
 from faao_mav.study import make_cases, parse_vary
-from faao_mav.study.figure import frontier_table, pareto
-from faao_mav.study.rows import StudyRow
-from faao_mav.study.sweep import (
-    MAX_ROWS,
-    frontier_cases,
-    parse_frontier,
-    parse_schemes,
-    parse_values,
-)
+from faao_mav.study.rows import StudyRow, comparison
+from faao_mav.study.sweep import MAX_ROWS, frontier_cases, parse_schemes, parse_values
 
 
 @given(
@@ -140,52 +133,40 @@ def test_sample_studies_are_of_section_iv() -> None:
             assert parse_plan(case.text).flight.altitude == 100
 
 
-points = st.tuples(st.integers(0, 9), st.none() | st.integers(0, 9))
-
-
-@given(st.lists(points, max_size=12))
-def test_no_point_is_better_than_one_of_the_frontier(
-    all_points: list[tuple[int, int | None]],
-) -> None:
-    rows = [
-        StudyRow("", {POWER: power}, "faao", 0, delivered=data, delivered_mbytes=data)
-        for power, data in all_points
-    ]
-    best = {(row.values[POWER], row.delivered) for row in pareto(rows, POWER)}
-    there = {(power, data) for power, data in all_points if data is not None}
-    assert best == {
-        (power, data)
-        for power, data in there
-        if not any(p <= power and d >= data and (p, d) != (power, data) for p, d in there)
-    }
-
-
 def test_the_points_of_a_frontier_end_at_the_plan() -> None:
     plan = parse_plan(edited(SMALL, {"radio.relay.power_dbm": 7.5, "goal": {"maximise": "rate"}}))
-    times = [parse_plan(case.text) for case in frontier_cases(plan, "flight.duration", 4)]
+    times = [parse_plan(case.text) for case in frontier_cases(plan, "duration,data", 4, vary={})]
     assert [each.flight.duration for each in times][-1] == plan.flight.duration
-    assert all(each.powers == plan.powers for each in times)
-    powers = [parse_plan(case.text) for case in frontier_cases(plan, POWER, 3)]
+    assert all(each.powers == plan.powers and not each.goal.maximise for each in times)
+    vary, schemes = {"radio.modulation": ("bpsk", "qpsk")}, ("faao", "mrt")
+    cases = frontier_cases(plan, "power, data", 3, vary=vary, schemes=schemes)
+    powers = [parse_plan(case.text) for case in cases[::4]]
     assert powers[-1].powers == pytest.approx(plan.powers)
     assert powers[0].powers == pytest.approx([power / 100 for power in plan.powers])
+    assert [case.scheme for case in cases] == ["faao", "mrt"] * 6
+    own = ("radio.base_station.power_dbm", -10.0)
+    assert cases[2].values == (own, ("radio.modulation", "qpsk"))
 
 
 def test_other_trade_offs_are_refused() -> None:
     for text in ("power", "data,power", "mass,data", "power,data,data"):
         with pytest.raises(InputError, match=r"--frontier .*duration,data or power,data"):
-            parse_frontier(text)
+            frontier_cases(parse_plan(SMALL), text, 3, vary={})
 
 
-def test_the_table_has_the_points_of_the_frontier() -> None:
-    plan, key = parse_plan(edited(SMALL, {"radio.bandwidth_mhz": 1})), "flight.duration"
+def test_data_is_megabytes_or_without_a_bandwidth_bits_of_a_hertz() -> None:
     rows = [
-        StudyRow("", {key: T}, "faao", 0, delivered=0.5, delivered_mbytes=data, error=error)
-        for T, data, error in ((8.0, 3.0, ""), (9.0, 2.5, ""), (10.0, 4.0, "late"))
+        StudyRow("", {"T": T}, "faao", 0, delivered=0.5, duration=T, error=error)
+        for T, error in ((8.0, ""), (10.0, "late"))
     ]
-    lines = frontier_table(rows, plan, key).splitlines()
-    assert lines[0].split() == ["duration,", "s", "delivered,", "megabytes", "bit/s/Hz"]
-    assert [line.split() for line in lines[1:3]] == [["8", "3", "0.5000"], ["10", "4", "0.5000"]]
-    assert lines[3] == "1 of 3 points failed, first: late"
+    lines = comparison(rows, data=True).splitlines()[-5:]
+    assert [line.split() for line in lines[:3]] == [
+        ["data,", "bit/Hz"],
+        ["T", "faao"],
+        ["8.0", "4.0000"],
+    ]
+    assert lines[4] == "1 of 2 rows failed, first: late"
+    assert replace(rows[0], delivered_mbytes=3.0).data == 3.0
 
 
 def test_a_frontier_is_drawn_by_the_command(tmp_path: Path) -> None:
@@ -196,10 +177,14 @@ def test_a_frontier_is_drawn_by_the_command(tmp_path: Path) -> None:
     run = ["study", str(plan), "--frontier", "duration,data", "--points", "3", "--jobs", "1"]
     told = CliRunner().invoke(app, [*run, "--out", str(tmp_path / "out"), "--json"])
     assert told.exit_code == 0, told.output
-    assert (tmp_path / "out" / "figure.svg").stat().st_size > 10_000
+    drawn = (tmp_path / "out" / "figure.svg").read_text()
+    assert "delivered, megabytes" in drawn
+    assert "duration T, s" in drawn
     rows = json.loads(told.stdout)["rows"]
     amounts = [row["delivered_mbytes"] for row in rows]
     assert amounts == sorted(amounts)
     assert rows[-1]["flight.duration"] == parse_plan(plan.read_text()).flight.duration
-    refused = CliRunner().invoke(app, [*run, "--power", "1,2"])
+    told = CliRunner().invoke(app, [*run, "--schemes", "mrt"])
+    assert "data, megabytes\nduration     mrt\n" in told.stdout
+    refused = CliRunner().invoke(app, [*run, "--vary", "flight.duration=8"])
     assert refused.exit_code == 2
