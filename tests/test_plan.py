@@ -88,12 +88,6 @@ def test_values_are_those_of_yaml_1_2_and_other_text_is_no_plan() -> None:
         with pytest.raises(PlanError, match=r"^p\.yaml: ") as caught:
             parse_plan(text, "p.yaml")
         assert part in str(caught.value)
-    # the method replaces the plan's
-    with pytest.raises(PlanError, match=r"optimizer\.method: 'magic' is not accepted"):
-        parse_plan(SMALL, method="magic")
-    plan = parse_plan(SMALL + "optimizer: {tolerance: 1e-3}\n", method="algorithm1")
-    assert plan.optimizer.method == "algorithm1"
-    assert parse_plan(plan.text).optimizer == plan.optimizer
 
 
 @given(st.dictionaries(st.text(), st.recursive(

@@ -108,7 +108,9 @@ def _checked_plan(
     from faao_mav.schedule.conversion import beyond_vehicle, check_vehicle
     from faao_mav.workflow import mission_files
 
-    plan = read_plan(plan_file, method=method)
+    plan = read_plan(plan_file)
+    if method is not None:
+        plan = plan.changed({"optimizer.method": method})
     to_fly = out is not None or upload is not None
     if to_fly:
         check_vehicle(plan)

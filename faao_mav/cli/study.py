@@ -40,22 +40,24 @@ class _Asked:
         Raises `PlanError` for values that no case can use; some may fail and become rows.
         """
         from faao_mav.plan import parse_plan
-        from faao_mav.plan.keys import POWER, varied_twice
+        from faao_mav.plan.keys import POWER
         from faao_mav.plan.sections import Study
         from faao_mav.study import make_cases, parse_vary
-        from faao_mav.study.sweep import frontier_cases, parse_schemes, parse_values
+        from faao_mav.study.sweep import check_varied, frontier_cases, parse_values
 
         options = [parse_vary(text) for text in self.vary or []]
         if self.power is not None:
             options.append((POWER, parse_values(self.power, "--power")))
-        if both := varied_twice(key for key, _ in options):
-            raise InputError(f"--vary {both}: varied twice; give all values in one option")
+        check_varied(key for key, _ in options)
         if self.points is not None and self.frontier is None:
             raise InputError(f"--points {self.points}: is for a frontier; give --frontier too")
+        if self.schemes is not None:
+            names = dict.fromkeys(name.strip() for name in self.schemes.split(","))
+            plan = plan.changed({"study.schemes": [*names]})
         asked = plan.study or Study()
         grid: dict[str, Any] = {
             "vary": dict(options) if options or self.frontier else asked.vary,
-            "schemes": asked.schemes if self.schemes is None else parse_schemes(self.schemes),
+            "schemes": asked.schemes,
             "seeds": self.seeds or asked.seeds,
         }
         if self.frontier is not None:

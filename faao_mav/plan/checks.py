@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from faao_mav.autopilot import vehicle_types
+from faao_mav.autopilot import vehicle_type, vehicle_types
 from faao_mav.errors import counted, quote
 from faao_mav.files import table
 from faao_mav.plan.fence import fence_problems
 from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Problem, listed, wrong
-from faao_mav.plan.keys import not_varied, varied_twice
 from faao_mav.plan.model import PlanContents
 from faao_mav.plan.radio import STATIONS, GainLaw
 from faao_mav.plan.sections import Flight, Heights
@@ -38,22 +37,17 @@ def problems(plan: PlanContents) -> Iterator[str]:
     Which it is a check yields by its row of `problems.tsv`, with the values that are said there.
     """
     says = {row["problem"]: row["says"] for row in table("plan/problems.tsv")}
-    checks = _vehicle, _goal, _together, _speeds, _gain, _rates, _steps, _stations, _distance
-    for check in (*checks, _power, fence_problems, _study):
+    checks = _vehicle, _together, _speeds, _gain, _rates, _steps, _stations, _distance
+    for check in (*checks, _power, fence_problems):
         for problem, values in check(plan):
             yield says[problem].format(plan=plan, **values)
 
 
 def _vehicle(plan: PlanContents) -> Iterator[Problem]:
-    vehicle = plan.vehicle
-    planned = {each.family.key: each for each in vehicle_types(vehicle.type) if each.flight_model}
-    known = planned.get(vehicle.autopilot)
-    if known is None:
-        yield wrong("type-autopilot", planned=listed([*planned], "and"))
-    elif not known.hovers and vehicle.min_speed == 0:
-        yield wrong("plane-hovers")
-    elif not known.hovers and plan.mission.on_finish == "land":
-        yield wrong("plane-lands")
+    known = vehicle_types(plan.vehicle.type)
+    planned = [each.family.key for each in known if each.flight_model]
+    if plan.vehicle.autopilot not in planned:
+        yield wrong("type-autopilot", planned=listed(planned, "and"))
 
 
 def _together(plan: PlanContents) -> Iterator[Problem]:
@@ -61,9 +55,17 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
     radio, goal, vehicle, power = plan.radio, plan.goal, plan.vehicle, plan.vehicle.power
     paper, no_band = plan.optimizer.method == "algorithm1", radio.bandwidth_mhz is None
     reliable, data = radio.reliability is not None, goal.maximise == "data"
-    searched = goal.minimise is not None
+    plane = not vehicle_type(vehicle.autopilot, vehicle.type).hovers
+    searched, amounts = goal.minimise is not None, (goal.deliver_mbytes, goal.rate)
     energy = goal.minimise == "energy" or data
     found = {
+        "plane-hovers": plane and vehicle.min_speed == 0,
+        "plane-lands": plane and plan.mission.on_finish == "land",
+        "goal-megabytes": not searched and goal.deliver_mbytes is not None,
+        "goal-rate": not searched and goal.rate is not None,
+        "goal-both": searched and goal.maximise is not None,
+        "goal-needs": searched and amounts == (None, None),
+        "goal-needs-one": searched and None not in amounts,
         "least-speed": vehicle.min_speed > vehicle.max_speed,
         "buffer-bandwidth": radio.relay.buffer_mbytes is not None and no_band,
         "rates-bandwidth": radio.rates is not None and radio.rates.mbit_per_s and no_band,
@@ -197,18 +199,6 @@ def _distance(plan: PlanContents) -> Iterator[Problem]:
     yield wrong("too-short", distance=distance, takes=takes, limited=limited)
 
 
-def _goal(plan: PlanContents) -> Iterator[Problem]:
-    goal = plan.goal
-    amounts = [name for name in ("deliver_mbytes", "rate") if getattr(goal, name) is not None]
-    if goal.minimise is None and amounts:
-        yield wrong("goal-amount", amount=amounts[0])
-    if goal.minimise is not None and goal.maximise is not None:
-        yield wrong("goal-both")
-    if goal.minimise is not None and len(amounts) != 1:
-        missing = "what has to be delivered is missing"
-        yield wrong("goal-needs", told="both are given" if amounts else missing)
-
-
 def _power(plan: PlanContents) -> Iterator[Problem]:
     power = plan.vehicle.power
     if power is None:
@@ -221,15 +211,6 @@ def _power(plan: PlanContents) -> Iterator[Problem]:
     if isinstance(model, RotaryWing) and model.parasite < 0 and power.at:
         least = replace(model, parasite=0.0).level(np.array(power.at))
         yield wrong("power-rotors", least=least)
-
-
-def _study(plan: PlanContents) -> Iterator[Problem]:
-    varied = plan.study.vary if plan.study else ()
-    for key in varied:
-        if problem := not_varied(key):
-            yield wrong("study-key", key=key, problem=problem)
-    if both := varied_twice(varied):
-        yield wrong("study-twice", both=both)
 
 
 def reach(steps: int, plan: PlanContents) -> float:

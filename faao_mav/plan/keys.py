@@ -1,7 +1,7 @@
-"""The keys of `plan.yaml`: what each means and accepts, and which of them a study varies."""
+"""The keys of `plan.yaml`: what each means and accepts."""
 
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args, get_origin
 
@@ -16,8 +16,6 @@ POWER = "power_dbm"
 ALIASES = {POWER: ("radio.base_station.power_dbm", "radio.relay.power_dbm")}
 """Keys of a study that stand for several of the plan."""
 
-_FREE = "vehicle.parameters."  # any name below it
-_NOT_VARIED = ("study", "name")
 _UNIT_WORDS = {"m": "metres", "s": "seconds"}
 
 
@@ -129,49 +127,15 @@ def _accepted(info: FieldInfo, unit: str, inside: tuple[str, ...]) -> str:
     return f"{number}{of}{low} {limits['le']:g}"
 
 
-def varied_twice(keys: Iterable[str]) -> str:
-    """Return two of `keys`, joined, that stand for the same value of a plan; nothing if none do."""
-    varied: dict[str, str] = {}
-    for key in keys:
-        for path in ALIASES.get(key, (key,)):
-            if path in varied:
-                return key if varied[path] == key else f"{varied[path]} and {key}"
-            varied[path] = key
-    return ""
-
-
-def unknown(above: str, name: str, *, dotted: bool = False) -> str:
+def unknown(above: str, name: str) -> str:
     """Return that the section `above` has no key `name`, and the known keys near it.
-
-    Those of the section are named alone, or as a study has them, `dotted`.
 
     >>> unknown("radio", "modulaton")
     'unknown key; did you mean modulation?'
     """
-    known = [*(ALIASES if dotted else ()), *reference()]
-    beside = {each.rpartition(".")[2]: each for each in known if each.rpartition(".")[0] == above}
+    beside = [each.rpartition(".")[2] for each in reference() if each.rpartition(".")[0] == above]
     close = difflib.get_close_matches(name, beside, n=1)
-    close = [beside[each] for each in close] if dotted else close
-    close = close or [each for each in known if each.rpartition(".")[2] == name]
+    close = close or [each for each in reference() if each.rpartition(".")[2] == name]
     if close:
         return f"unknown key; did you mean {' or '.join(close)}?"
-    if dotted and not beside:
-        return "unknown key; give a dotted key of the plan, as radio.modulation"
     return f"unknown key; known here: {', '.join(sorted(beside))}"
-
-
-def not_varied(key: str) -> str:
-    """Return why a study cannot vary `key`, and what is near it; nothing for a key that it can.
-
-    >>> not_varied("radio.relay.power_dbm"), not_varied("radio.duplx")
-    ('', 'unknown key; did you mean radio.duplex?')
-    """
-    known = reference()
-    if key in ALIASES or key.removeprefix(_FREE) not in ("", key):
-        return ""
-    if key.partition(".")[0] in _NOT_VARIED:
-        return "unknown key of a study; give another key of the plan, as radio.modulation"
-    if key not in known:
-        return unknown(*key.rpartition(".")[::2], dotted=True)
-    inside = [path for path in known if path.startswith(f"{key}.") and not known[path].inside]
-    return f"a section cannot be varied; give one of {', '.join(inside)}" if inside else ""

@@ -102,21 +102,20 @@ class Plan(PlanContents):
 _READER: TypeAdapter[Plan] = TypeAdapter(Plan)
 
 
-def read_plan(path: str | Path, *, method: str | None = None) -> Plan:
+def read_plan(path: str | Path) -> Plan:
     """Read and validate the plan in the file `path`.
 
-    `method`, where given, replaces `optimizer.method`. Raises `PlanError` that names the file,
-    the key, the value and what would be accepted.
+    Raises `PlanError` that names the file, the key, the value and what would be accepted.
 
     >>> plan = read_plan("missions/copter_relay.yaml")
     >>> plan.flight.start, plan.flight.duration, plan.radio.modulation
     ((0.0, 350.0), 120.0, 'qpsk')
     """
     text = read_text(path, 4 * MAX_CHARACTERS + 2 * MAX_WORD, "a plan", PlanError)
-    return parse_plan(text, str(path), method=method)
+    return parse_plan(text, str(path))
 
 
-def parse_plan(text: str, source: str = "plan", *, method: str | None = None) -> Plan:
+def parse_plan(text: str, source: str = "plan") -> Plan:
     """Validate the plan in `text`; `source` names it in messages. See `read_plan`.
 
     >>> from pathlib import Path
@@ -124,10 +123,6 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     120.0
     """
     data = load_yaml(text, source)
-    if method is not None:
-        section = data.setdefault("optimizer", {})
-        if isinstance(section, dict):
-            section["method"] = method
     files = filled_in(data, source)
     try:
         plan = _READER.validate_python(data, context={})
@@ -137,7 +132,7 @@ def parse_plan(text: str, source: str = "plan", *, method: str | None = None) ->
     if of_file := plan.fence is not None and plan.fence.file is not None:
         data["fence"] = written_out(fence, plan.fence.margin)
     # a copy of the text, as beside a result, has to stand without the files that it names
-    if method is not None or files or of_file:
+    if files or of_file:
         text = dump_yaml(data)
     for name, value in {"geofence": fence, "text": text, "source": source}.items():
         object.__setattr__(plan, name, value)

@@ -3,11 +3,11 @@
 import hashlib
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from importlib.metadata import version
-from typing import Any, TypeAlias, get_args
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,9 +15,8 @@ from faao_mav.errors import InputError, PlanError, place_of, quote
 from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import dbm
-from faao_mav.plan.keys import ALIASES, POWER, not_varied, varied_twice
+from faao_mav.plan.keys import ALIASES, POWER
 from faao_mav.plan.reader import changed
-from faao_mav.plan.sections import StudyScheme
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.power import JOULES_PER_WH
 
@@ -58,10 +57,7 @@ def parse_vary(text: str) -> tuple[str, tuple[Value, ...]]:
     key, sign, values = text.partition("=")
     if not sign:
         raise InputError(f"--vary {quote(text)}: give key=start:stop:step or key=value,value")
-    key = key.strip()
-    if problem := not_varied(key):
-        raise InputError(f"--vary {place_of([key])}: {problem}")
-    return key, parse_values(values, f"--vary {key}")
+    return key.strip(), parse_values(values, f"--vary {place_of([key.strip()])}")
 
 
 def parse_values(text: str, option: str) -> tuple[Value, ...]:
@@ -81,16 +77,6 @@ def parse_values(text: str, option: str) -> tuple[Value, ...]:
         found += _range(value, option) if is_range else [value]
         _check_count(len(found), option)
     return tuple(found)
-
-
-def parse_schemes(text: str) -> tuple[str, ...]:
-    """Return the schemes of `faao,mmse,...`. Raises `InputError` for a name that is none."""
-    schemes = tuple(dict.fromkeys(name.strip() for name in text.split(",")))
-    known = get_args(StudyScheme)
-    for name in schemes:
-        if name not in known:
-            raise InputError(f"--schemes {name}: expected some of {','.join(known)}")
-    return schemes
 
 
 def _range(text: str, option: str) -> list[float]:
@@ -118,6 +104,18 @@ def _check_count(count: Decimal | int, what: str) -> None:
         raise InputError(f"{what}: {float(count):,.6g} rows; a study has at most {MAX_ROWS:,}")
 
 
+def check_varied(keys: Iterable[str]) -> None:
+    """Raise `InputError` where two `keys` of a study set the same, or one what the study is."""
+    varied = {"study": "the study"}
+    for key in keys:
+        for path in ALIASES.get(key, (key,)):
+            for other, by in varied.items():
+                if f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}."):
+                    told = f"{place_of([by])} sets the same; leave one out"
+                    raise InputError(f"vary {place_of([key])}: {told}")
+            varied[path] = key
+
+
 def make_cases(
     text: str,
     *,
@@ -129,7 +127,8 @@ def make_cases(
     """Return the grid of all values, schemes and seeds, in this order, the seeds fastest.
 
     `text` is a sound plan, `source` names it. Seeds count up from its `radio.seed`. Raises
-    `InputError` for a grid of more than `MAX_ROWS`.
+    `InputError` for a grid of more than `MAX_ROWS`, a value that is varied twice, and a study that
+    varies itself.
 
     >>> from faao_mav import read_plan
     >>> plan = read_plan("missions/copter_relay.yaml")
@@ -140,6 +139,7 @@ def make_cases(
     data = load_yaml(text, source)
     data.pop("study", None)
     _check_count(math.prod(map(len, vary.values())) * len(schemes) * seeds, source)
+    check_varied(vary)
     made = []
     for values in itertools.product(*vary.values()):
         pairs = tuple(zip(vary, values, strict=True))
@@ -195,8 +195,7 @@ def frontier_cases(plan: Plan, frontier: str, points: int, **grid: Any) -> tuple
         case _:
             accepted = "duration,data or power,data or energy,data"
             raise InputError(f"--frontier {quote(frontier)}: expected {accepted}")
-    if both := varied_twice((key, *grid["vary"])):
-        raise InputError(f"--frontier {frontier}: {both} varied too; give one of both")
+    check_varied((key, *grid["vary"]))
     data = load_yaml(plan.text, plan.source) | {"goal": {}}
     return tuple(
         replace(case, values=((key, next(iter(changes.values()))), *case.values))
@@ -210,9 +209,7 @@ def _energies(plan: Plan, points: int) -> list[float]:
     from faao_mav.optimizer.goal import thriftiest_straight
     from faao_mav.optimizer.problem import build_problem
 
-    if plan.vehicle.power is None or not plan.radio.causal:
-        missing = "vehicle.power" if plan.vehicle.power is None else "radio.causal: true"
-        raise InputError(f"{plan.source}: --frontier energy,data: give {missing} in the plan")
+    plan.changed({"goal": {"maximise": "data", "energy_wh": 1.0}})  # tells what is missing
     most = direct(build_problem(plan)).energy_wh
     least = thriftiest_straight(plan)[1] / JOULES_PER_WH
     assert most is not None
