@@ -54,7 +54,7 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
     """Yield which keys do not go together, and which not without another."""
     radio, goal, vehicle, power = plan.radio, plan.goal, plan.vehicle, plan.vehicle.power
     paper, no_band = plan.optimizer.method == "algorithm1", radio.bandwidth_mhz is None
-    reliable, data = radio.reliability is not None, goal.maximise == "data"
+    rates, reliable, data = radio.rates, radio.reliability is not None, goal.maximise == "data"
     plane = not vehicle_type(vehicle.autopilot, vehicle.type).hovers
     searched, amounts = goal.minimise is not None, (goal.deliver_mbytes, goal.rate)
     energy = goal.minimise == "energy" or data
@@ -68,7 +68,9 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
         "goal-needs-one": searched and None not in amounts,
         "least-speed": vehicle.min_speed > vehicle.max_speed,
         "buffer-bandwidth": radio.relay.buffer_mbytes is not None and no_band,
-        "rates-bandwidth": radio.rates is not None and radio.rates.mbit_per_s and no_band,
+        "rates-both": rates is not None and rates.mbit_per_s and rates.bit_per_s_per_hz,
+        "rates-none": rates is not None and not (rates.mbit_per_s or rates.bit_per_s_per_hz),
+        "rates-bandwidth": rates is not None and rates.mbit_per_s and no_band,
         "reliability-spread": reliable and not any(radio.spreads),
         "algorithm1-causal": paper and radio.causal,
         "algorithm1-reliability": paper and reliable,
@@ -107,11 +109,8 @@ def _rates(plan: PlanContents) -> Iterator[Problem]:
     rates = plan.radio.rates
     if rates is None:
         return
-    given = [name for name in ("mbit_per_s", "bit_per_s_per_hz") if getattr(rates, name)]
-    if len(given) != 1:
-        yield wrong("rates-kind", told="both are given" if given else "the rates are missing")
-        return
-    key, values = given[0], getattr(rates, given[0])
+    key = "mbit_per_s" if rates.mbit_per_s else "bit_per_s_per_hz"
+    values = getattr(rates, key)
     if len(values) != len(rates.snr_db):
         yield wrong("rates-count", key=key, rates=len(values), ratios=len(rates.snr_db))
     if not any(values):

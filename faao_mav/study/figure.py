@@ -4,7 +4,6 @@ import itertools
 import json
 import re
 from collections.abc import Mapping, Sequence
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from faao_mav.errors import InputError
 from faao_mav.plan import Plan
 from faao_mav.plan.keys import POWER
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
-from faao_mav.study.rows import StudyRow, spread, unit_of_data
+from faao_mav.study.rows import StudyRow, averaged, unit_of_data
 from faao_mav.study.sweep import ENERGY, Value
 
 if TYPE_CHECKING:
@@ -121,8 +120,7 @@ def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> N
         if not found:
             continue
         x = sorted(found)
-        mean = np.array([fmean(found[at]) for at in x])
-        deviation = np.array([spread(found[at]) for at in x])
+        mean, deviation = np.array([averaged(found[at]) for at in x]).T
         whose = _SCHEMES[scheme] if len(schemes) > 1 or not name else ""
         k = (list(_SCHEMES).index(scheme) + of) % len(SERIES)
         shown = ": ".join(filter(None, (whose, name)))
@@ -142,23 +140,20 @@ def _routes(rows: Sequence[StudyRow], plan: Plan) -> "Figure":
         several = len({row.scheme for row in rows}) > 1
         colours: dict[str, str] = {}
         for row in rows:
-            if not len(row.route):
+            if not row.route:
                 continue
             name = _named(row.values)
             if several or not name:
                 name = ", ".join(filter(None, (name, _SCHEMES[row.scheme])))
-            east, north = row.route.T
             new = name not in colours
             colour = colours.setdefault(name, SERIES[len(colours) % len(SERIES)])
             width = max(1.2, 4.0 - 1.4 * list(colours).index(name))
-            plot.plot(east, north, color=colour, linewidth=width, label=name if new else None)
+            way = np.transpose(row.route)
+            plot.plot(*way, color=colour, linewidth=width, label=name if new else None)
         figure.legend(loc="outside lower center", ncols=min(len(colours), 4))
         flight, t = plan.flight, plan.flight.time_step * np.arange(float(plan.flight.slots))
-        ways: list[Any] = [
-            *(each.at(t) for each in plan.radio.stations),
-            [flight.start],
-            [flight.end],
-        ]
+        ways: list[Any] = [each.at(t) for each in plan.radio.stations]
+        ways += [[flight.start], [flight.end]]
         places = list(zip(("base station", "user", "start", "end"), ways, "s^oo", strict=True))
         plot.plot(*np.concatenate(ways).T, linestyle="none")
         plot.set_aspect("equal", adjustable="datalim")

@@ -5,16 +5,15 @@ import io
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, PlainValidator, TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from faao_mav.arrays import Real
 from faao_mav.errors import InputError, counted, place_of
 from faao_mav.files import read_bytes, write_whole
 from faao_mav.study.sweep import StudyCase, Value
@@ -26,16 +25,6 @@ MAX_BYTES = 10_000_000
 """Bytes of a row that are read; chosen: a flight of 500,000 slots."""
 
 
-def _route(pairs: object) -> Real:
-    try:
-        route = np.array(pairs or np.empty((0, 2)), dtype=np.float64)
-    except (TypeError, ValueError):
-        route = np.array(np.nan)
-    if route.shape[1:] != (2,) or not np.isfinite(route).all():
-        raise ValueError("not pairs of finite numbers")
-    return route
-
-
 @dataclass(frozen=True, slots=True)
 class StudyRow:
     """What one case of a study led to.
@@ -45,7 +34,7 @@ class StudyRow:
     `delivered_mbytes` what a flight carries, 10^6 bytes, None without a bandwidth; `duration` is
     that of the flight, s, `seconds` the time of the optimiser. Where there is no result `error`
     says why and the numbers are None.
-    `route` is w (n, 2), m, one pair for each slot.
+    `route` is w, [east, north] of each slot, m.
 
     >>> row = StudyRow("", {"flight.altitude": 60}, "faao", 0, R_avg=1.5, delivered=1.4)
     >>> row.values["flight.altitude"], row.delivered, len(row.route)
@@ -70,9 +59,7 @@ class StudyRow:
     iterations: int | None = None
     converged: bool | None = None
     error: str = ""
-    route: Annotated[Real, PlainValidator(_route)] = field(
-        default_factory=lambda: np.empty((0, 2)), compare=False
-    )
+    route: tuple[tuple[float, float], ...] = ()
 
     @property
     def data(self) -> float | None:
@@ -118,7 +105,7 @@ def as_array(rows: Sequence[StudyRow]) -> NDArray[np.void]:
 
 def keep_row(row: StudyRow, directory: Path) -> None:
     """Write the file of `row` in the `directory` of its study. Raises `InputError`."""
-    content = json.dumps(asdict(row) | {"route": row.route.tolist()}, allow_nan=False)
+    content = json.dumps(asdict(row), allow_nan=False)
     try:
         write_whole(directory / ROWS / f"{row.key}.json", content.encode())
     except InputError as error:
@@ -170,9 +157,9 @@ def in_order(cases: Sequence[StudyCase], rows: Mapping[str, StudyRow]) -> tuple[
     )
 
 
-def spread(rates: Sequence[float]) -> float:
-    """Return the standard deviation of `rates`, 0 of a single one."""
-    return stdev(rates) if len(rates) > 1 else 0.0
+def averaged(values: Sequence[float]) -> tuple[float, float]:
+    """Return mean and standard deviation of `values`, 0 of a single one."""
+    return fmean(values), stdev(values) if len(values) > 1 else 0.0
 
 
 def unit_of_data(rows: Sequence[StudyRow]) -> str:
@@ -215,4 +202,5 @@ def _compared(rows: Sequence[StudyRow], measure: str, unit: str) -> list[str]:
 def _cell(rates: Sequence[float]) -> str:
     if not rates:
         return "-"
-    return f"{fmean(rates):.4f}" + (f" +- {spread(rates):.4f}" if len(rates) > 1 else "")
+    mean, deviation = averaged(rates)
+    return f"{mean:.4f}" + (f" +- {deviation:.4f}" if len(rates) > 1 else "")

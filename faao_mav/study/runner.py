@@ -45,7 +45,7 @@ def run_case(case: StudyCase) -> StudyRow:
         seconds=round(result.seconds_optimize, 3),
         iterations=solution.iterations,
         converged=solution.converged,
-        route=solution.w.round(3),
+        route=tuple((east, north) for east, north in solution.w.round(3).tolist()),
     )
 
 

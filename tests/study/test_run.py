@@ -84,7 +84,7 @@ def test_a_row_is_what_the_plan_gives(whole: Whole) -> None:
     (again,) = run_study(make_cases(QUICK, vary=same), jobs=1, directory=whole[0])
     assert (again.key, again.seconds, again.R_avg) == (row.key, row.seconds, row.R_avg)
     assert again.values == {"radio.causal": False, "vehicle.max_speed": 20, "power_dbm": 10}
-    assert again.route.tolist() == row.route.tolist()
+    assert again.route == row.route
 
 
 def test_a_resumed_study_is_the_uninterrupted_one(tmp_path: Path, whole: Whole) -> None:
@@ -189,8 +189,8 @@ def test_what_is_no_row_is_refused_by_its_file(whole: Whole, tmp_path: Path) -> 
     changed: dict[str, dict[str, Any]] = {
         "seed: Input should be a valid integer": {"seed": "0"},
         "delivered: Input should be a finite number": {"delivered": math.nan},
-        "route: Value error, not pairs of finite numbers": {"route": [[1, 2], [3]]},
-        "route: Value error, not pairs": {"route": [[1e999, 0]]},
+        r"route\[1\]\[1\]: Field required": {"route": [[1, 2], [3]]},
+        r"route\[0\]\[0\]: Input should be a finite number": {"route": [[1e999, 0]]},
         "more: Unexpected keyword argument": {"more": 1},
     }
     texts = {said: json.dumps(sound | changes).encode() for said, changes in changed.items()}
