@@ -17,6 +17,7 @@ from faao_mav.plan.fields import MAX_LOCAL_DISTANCE, Problem, listed, wrong
 from faao_mav.plan.model import PlanContents
 from faao_mav.plan.radio import STATIONS, GainLaw
 from faao_mav.plan.sections import Flight, Heights
+from faao_mav.plan.station import FASTEST
 from faao_mav.power import RotaryWing
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.vector import chord
@@ -55,7 +56,7 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
     radio, goal, vehicle, power = plan.radio, plan.goal, plan.vehicle, plan.vehicle.power
     paper, no_band = plan.optimizer.method == "algorithm1", radio.bandwidth_mhz is None
     rates, reliable, data = radio.rates, radio.reliability is not None, goal.maximise == "data"
-    plane = not vehicle_type(vehicle.autopilot, vehicle.type).hovers
+    heights, plane = plan.flight.height, not vehicle_type(vehicle.autopilot, vehicle.type).hovers
     searched, amounts = goal.minimise is not None, (goal.deliver_mbytes, goal.rate)
     energy = goal.minimise == "energy" or data
     found = {
@@ -66,6 +67,7 @@ def _together(plan: PlanContents) -> Iterator[Problem]:
         "goal-both": searched and goal.maximise is not None,
         "goal-needs": searched and amounts == (None, None),
         "goal-needs-one": searched and None not in amounts,
+        "heights": isinstance(heights, Heights) and heights.least >= heights.most,
         "least-speed": vehicle.min_speed > vehicle.max_speed,
         "buffer-bandwidth": radio.relay.buffer_mbytes is not None and no_band,
         "rates-both": rates is not None and rates.mbit_per_s and rates.bit_per_s_per_hz,
@@ -175,6 +177,8 @@ def _stations(plan: PlanContents) -> Iterator[Problem]:
     for name, station in zip(STATIONS, plan.radio.stations, strict=True):
         given, track = quote(list(station.velocity)), station.track
         away = float(np.abs(station.at(np.array([lasts]))).max()) / 1000
+        if math.hypot(*station.velocity) > FASTEST:
+            yield wrong("station-fast", name=name, given=given, fastest=FASTEST)
         if track is not None and any(station.velocity):
             yield wrong("track-velocity", name=name, given=given)
         if track is not None and track.times[-1] < lasts:

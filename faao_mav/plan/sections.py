@@ -100,12 +100,6 @@ class Heights(NamedTuple):
     most: _Height
 
 
-def _rising(height: float | Heights) -> float | Heights:
-    if isinstance(height, Heights) and height.least >= height.most:
-        raise ValueError("the least is not below the most")
-    return height
-
-
 @section
 class Flight:
     """The flight that is optimised.
@@ -118,7 +112,6 @@ class Flight:
     height: Annotated[
         Annotated[_Height, Tag("<height>")] | Annotated[Heights, Tag("<heights>")],
         Discriminator(lambda value: "<heights>" if isinstance(value, dict) else "<height>"),
-        AfterValidator(_rising),
     ]
     duration: Number
     time_step: Number = 0.2

@@ -11,13 +11,13 @@ from pydantic_core import PydanticCustomError
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError, MissionFileError, PlanError, quote
 from faao_mav.files import read_columns
-from faao_mav.plan.fields import PLACE, read_pair, read_position, section, told
+from faao_mav.plan.fields import PLACE, Number, read_position, section, told
 from faao_mav.vector import Vector
 
 MAX_POINTS = 5_000
 """Points of the longest track; chosen: 80 minutes of one a second."""
 
-_FASTEST = 150.0
+FASTEST = 150.0
 """Greatest speed of a station, m/s; chosen: no train, boat or relayed aircraft is as fast."""
 
 _LOCAL, _GLOBAL = ("time_s", "east_m", "north_m"), ("time_s", "latitude", "longitude")
@@ -87,8 +87,8 @@ def _track(value: object, info: ValidationInfo) -> Track | None:
             raise told(f"point {number}: {error}") from None
         if not (math.isfinite(t) and t > before):
             raise told(f"point {number}: time {t:g} s; give finite times that rise")
-        if places[1:] and math.dist(*places[-2:]) > _FASTEST * (t - before):
-            raise told(f"point {number}: more than {_FASTEST:g} m/s from the point before")
+        if places[1:] and math.dist(*places[-2:]) > FASTEST * (t - before):
+            raise told(f"point {number}: more than {FASTEST:g} m/s from the point before")
         before = t
     return Track(tuple(t - times[0] for t in times), tuple(places))
 
@@ -109,18 +109,6 @@ _OF_TRACK: Any = None
 _Place: TypeAlias = Annotated[Vector, PlainValidator(_place), PLACE]
 
 
-def _velocity(value: object) -> Vector:
-    velocity = read_pair(value, "[east, north] in m/s")
-    if math.hypot(*velocity) > _FASTEST:
-        raise ValueError("faster than any vehicle")
-    return velocity
-
-
-_Velocity: TypeAlias = Annotated[
-    Vector, PlainValidator(_velocity), f"[east, north] in m/s, at most {_FASTEST:g} m/s"
-]
-
-
 @section
 class Station:
     """A station, which stands or moves.
@@ -132,7 +120,7 @@ class Station:
 
     track: Annotated[Track | None, PlainValidator(_track)] = None
     position: _Place = _OF_TRACK
-    velocity: _Velocity = (0.0, 0.0)
+    velocity: tuple[Number, Number] = (0.0, 0.0)
 
     @property
     def moves(self) -> bool:
