@@ -14,7 +14,6 @@ import numpy as np
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError, PlanError
 from faao_mav.mission.fence_area import Area
-from faao_mav.optimizer.rough import RoughFlight
 from faao_mav.optimizer.shadowing import Shadowed
 from faao_mav.optimizer.solution import Solution
 from faao_mav.plan import Plan, parse_plan
@@ -62,7 +61,7 @@ class Answer:
     result: Result | None = None
 
 
-def answer(text: str, source: str, solve: Callable[[Plan], RoughFlight | Result]) -> Answer:
+def answer(text: str, source: str, solve: Callable[[Plan], Solution | Result]) -> Answer:
     """Return what `solve` finds for the plan `text`, or why it finds nothing."""
     try:
         found = solve(parse_plan(text, source))
@@ -82,7 +81,7 @@ def answer(text: str, source: str, solve: Callable[[Plan], RoughFlight | Result]
     )
 
 
-def _drawing(flight: RoughFlight | Solution, result: Result | None) -> dict[str, Any]:
+def _drawing(flight: Solution, result: Result | None) -> dict[str, Any]:
     plan = flight.plan
     frame = plan.origin.frame
 
@@ -126,7 +125,7 @@ def _zones_of_file(plan: Plan) -> list[Area]:
     return [*plan.zones[drawn:polygons], *plan.zones[polygons + len(own) - drawn :]]
 
 
-def charts(flight: RoughFlight | Solution, under: Shadowed | None = None) -> list[dict[str, Any]]:
+def charts(flight: Solution, under: Shadowed | None = None) -> list[dict[str, Any]]:
     """Return the charts of `flight` over time, s, with what arrives `under` shadowing."""
     plan, relayed = flight.plan, flight.relayed
     held, unit = of_a_slot(plan)

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 from faao_mav.app.answers import Answer, answer
 from faao_mav.arrays import Real
 from faao_mav.errors import FaaoError
-from faao_mav.optimizer.rough import rough_flight
+from faao_mav.optimizer.direct import rough_flight
 from faao_mav.workflow import plan_mission
 
 T = TypeVar("T")

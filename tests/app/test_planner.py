@@ -14,7 +14,7 @@ from faao_mav.app import workers
 from faao_mav.app.answers import Answer, answer
 from faao_mav.app.workers import Planner, Workers
 from faao_mav.errors import FaaoError
-from faao_mav.optimizer.rough import rough_flight
+from faao_mav.optimizer.direct import rough_flight
 
 
 class Held:

@@ -10,11 +10,11 @@ from conftest import FLYABLE, MISSIONS, MakePlan, edited
 from faao_mav import parse_plan
 from faao_mav.errors import PlanError
 from faao_mav.optimizer.design import design
+from faao_mav.optimizer.direct import rough_flight
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates import table_rate
 from faao_mav.optimizer.rates.field import rate_field
-from faao_mav.optimizer.rough import rough_flight
 from faao_mav.optimizer.search.starts import ROUGH
 from faao_mav.optimizer.solution import Progress, load_solution, save_solution
 from faao_mav.plan import Plan, read_plan

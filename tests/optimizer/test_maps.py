@@ -15,13 +15,12 @@ from faao_mav.autopilot import Track
 from faao_mav.errors import PlanError
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
-from faao_mav.optimizer.direct import direct
+from faao_mav.optimizer.direct import direct, rough_flight
 from faao_mav.optimizer.interior.maximize import objective
 from faao_mav.optimizer.interior.rewards import Stage
 from faao_mav.optimizer.optimize import optimize
 from faao_mav.optimizer.problem import build_problem
 from faao_mav.optimizer.rates.field import Blurred, rate_field
-from faao_mav.optimizer.rough import rough_flight
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import most_gain
 from faao_mav.optimizer.search.over_map import QueueSweep

@@ -136,10 +136,12 @@ class QueueSweep:
         return np.asarray(found if low.ndim == values.ndim else found[0])
 
 
-def starts_over_map(problem: Problem, field: RateField) -> dict[str, Trajectory]:
-    """Return the best flights along paths over so many cells: `map`, `map 2` and on."""
+def starts_over_map(
+    problem: Problem, field: RateField, cells: Sequence[int] = ()
+) -> dict[str, Trajectory]:
+    """Return the best flights along paths over `cells` (or `CELLS`) cells: `map`, `map 2` ..."""
     found: dict[str, Trajectory] = {}
-    for count in CELLS:
+    for count in cells or CELLS:
         flights = [*flights_over_map(problem, field, count)]
         if flights:
             best = max(flights, key=lambda flight: _worth(problem, field, flight))
