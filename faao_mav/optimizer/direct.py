@@ -36,6 +36,7 @@ from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, spari
 from faao_mav.optimizer.shadowing import SHADES, shaded, under_shadowing
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.plan import Plan
+from faao_mav.radio.gain import GainField
 from faao_mav.radio.rate_steps import RateSteps
 
 _LONG_SEARCH = 6
@@ -263,7 +264,7 @@ class _Search:
         begin, problem, field = optimum.trajectory, self.problem, self.field
         options, found = problem.plan.optimizer, [optimum]
         for z in SHADES:
-            stage = shaded(problem, field.smoothed(), begin.w, z)
+            stage = shaded(problem, field.over(GainField.smoothed), begin.w, z)
             limits = options.tolerance, options.max_iterations
             found.append(problem.improved(stage, begin, *limits, warm=True))
 

@@ -28,6 +28,7 @@ from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import cells_of, largest_ahead
 from faao_mav.plan import Plan, parse_plan
 from faao_mav.plan.model import ground_areas, in_ground
+from faao_mav.radio.gain import GainField
 from faao_mav.radio.gain_map import GainMap
 from faao_mav.radio.map_file import map_archive
 from faao_mav.radio.relay import RelayQueue
@@ -57,7 +58,7 @@ def test_slopes_over_a_map_are_those_of_differences(
     small_plan: MakePlan, seed: int, blurred: bool
 ) -> None:
     problem = with_maps(build_problem(small_plan(FAINT)), seed)
-    smooth: Stage = rate_field(problem, design(problem.plan)).smoothed()
+    smooth: Stage = rate_field(problem, design(problem.plan)).over(GainField.smoothed)
     stage = Blurred(smooth, 4.0) if blurred else smooth
     w = np.random.default_rng(seed).uniform(-30, 90, (2, 6))
     at, h = stage(w), 0.01

@@ -143,13 +143,10 @@ def nearest_flight(
     path: Real,
     start: Trajectory,
     constraints: Sequence[Constraint] = (),
-    *,
-    first: bool = False,
 ) -> Trajectory | None:
     """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
 
-    None where none is found that keeps `constraints` too. `start` is any flight of `kin`. With
-    `first` the way there ends with a flight that keeps them.
+    None where none is found that keeps `constraints` too. `start` is any flight of `kin`.
     """
 
     def closeness(w: Real) -> StageValues:
@@ -164,10 +161,7 @@ def nearest_flight(
         if goal.flat:
             continue
         search = Search(kin, every, goal, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
-        for most in range(1, _MOST_STEPS + 1) if first else (_MOST_STEPS,):
-            with np.errstate(all="ignore"):
-                converged = search.run(most)
-            start = kin.follow(search.v.T * kin.max_speed)
-            if converged or (first and every_excess(kin, every, start) <= ALLOWED):
-                break
+        with np.errstate(all="ignore"):
+            search.run(_MOST_STEPS)
+        start = kin.follow(search.v.T * kin.max_speed)
     return start if every_excess(kin, (*limits, *constraints), start) <= ALLOWED else None

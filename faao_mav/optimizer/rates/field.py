@@ -1,5 +1,6 @@
 """Both links' rates as functions of the UAV's position: what a flight maximises the means of."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from faao_mav.optimizer.interior.rewards import Stage, StageValues
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates import RateModel, by_position, link_coordinates
 from faao_mav.optimizer.rates.table_rate import STEP, kind_of, table_rates
-from faao_mav.radio.gain import PER_DB
+from faao_mav.radio.gain import PER_DB, GainField
 from faao_mav.radio.rate_steps import RateSteps
 
 
@@ -103,14 +104,9 @@ class RateField:
             np.stack([each.hessian for each in found], axis=1),
         )
 
-    def smoothed(self) -> "RateField":
-        """Return the rates over maps that are smooth: see `Grid.smoothed`."""
-        links = (replace(link, gains=link.gains.smoothed()) for link in self.links)
-        return replace(self, links=tuple(links))
-
-    def in_slot(self, slot: int) -> "RateField":
-        """Return the rates everywhere with the stations where they are in a `slot`."""
-        links = (replace(link, gains=link.gains.in_slots(slot)) for link in self.links)
+    def over(self, changed: Callable[..., GainField], *how: int) -> "RateField":
+        """Return the rates over path gains that a method of theirs has `changed`, by `how`."""
+        links = (replace(link, gains=changed(link.gains, *how)) for link in self.links)
         return replace(self, links=tuple(links))
 
 

@@ -29,6 +29,7 @@ from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
 from faao_mav.optimizer.search.map_bound import places_about
 from faao_mav.optimizer.search.straight import straight_flight, with_stops
 from faao_mav.optimizer.search.sweep import NOWHERE, Cells, cells_of, largest_ahead
+from faao_mav.radio.gain import GainField
 from faao_mav.radio.relay import RelayQueue
 
 CELLS, _LEVELS, _REACH = (3_000, 5_000), 30, 4.0
@@ -228,11 +229,9 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         near = np.hypot(*(x - ends[:, :, None]).swapaxes(0, 1)).min(axis=0) < 2 * found.side
         inside = (free | near & problem.free_area.covers(x.T)).reshape(inside.shape)
         found = replace(found, alive=found.alive & inside)
-    if any(link.gains.station.ndim > 1 for link in problem.links):
-        slots = [int(block[len(block) // 2]) for block in found.blocks]
-        fields = [field.in_slot(slot) for slot in slots]
-    else:
-        fields = [field]
+    moving = any(link.gains.station.ndim > 1 for link in problem.links)
+    slots = [int(block[len(block) // 2]) for block in found.blocks] if moving else [0]
+    fields = [field.over(GainField.in_slots, slot) for slot in slots]
     rates = np.stack([each.value(found.x[..., None])[..., 0] for each in fields], axis=1)
     counts = np.array([len(block) for block in found.blocks])
     step = kin.max_speed * float(np.diff(found.instants).max(initial=0.0)) / found.side
@@ -260,7 +259,7 @@ def improved_over_map(
     One that gains much is made again, at `most` so often.
     """
     kin, relay = problem.kinematics, problem.maximised_queue
-    smooth, side = field.smoothed(), _side(problem, CELLS[0])
+    smooth, side = field.over(GainField.smoothed), _side(problem, CELLS[0])
     limits = (*constraints_of(kin), *problem.fenced(kin))
 
     now, worth = start, _worth(problem, field, start)
