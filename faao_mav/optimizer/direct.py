@@ -51,9 +51,6 @@ _EQUAL = 1e-6
 """The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
 is then up to rounding, and differs from machine to machine. Chosen."""
 
-_FOLLOWED = 2
-"""Starts over a map that are improved: the best as they are. Chosen."""
-
 _ROUGHLY, _ROUGH_STEPS, _ROUGH_CELLS = 1e-2, 12, 800
 """Tolerance, bit/s/Hz, of a rough flight, steps of its search, twice as many with a least speed,
 and cells of its path over a map. Measured with the user dragged by 70 to 100 m: `copter_relay.yaml`
@@ -96,18 +93,13 @@ def direct(
         better = [name for name in routes if values[name] > begun[name]]
         flights |= {name: improved[name] for name in better}
         reached |= {name: values[name] for name in better}
-    if problem.mapped:
-        going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]
-    else:
-        equal = (search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
-        going = list(dict.fromkeys(equal))
-    tell(2, "the best start", reached[going[0]])
-    warm = several or (alone and problem.kinematics.min_speed == 0)
-    optima = {name: search.followed(flights[name], warm=warm) for name in going}
-    ends = {name: optimum.trajectory for name, optimum in optima.items()}
-    best = optima[search.best({name: each.value for name, each in optima.items()}, ends)]
+    going = search.best(reached, flights)
+    tell(2, "the best start", reached[going])
+    warm = several or (rough and alone and problem.kinematics.min_speed == 0)
+    best = search.followed(flights[going], warm=warm)
+    end = search.value(best.trajectory)
     if isinstance(own_steps, RateSteps) and not rough:
-        best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
+        best = search.sharpened([best, replace(best, trajectory=flights[going])])
     if any(problem.plan.radio.spreads) and not rough:
         best = search.under_shadowing(best)
     flight = best.trajectory
@@ -124,7 +116,7 @@ def direct(
     found = solution.maximised
     # values by tables may be above those of the precoders, and without shadowing more is delivered
     history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
-    reached |= {name: search.value(flight) for name, flight in ends.items()}
+    reached[going] = end
     return replace(
         solution,
         history=np.append(np.minimum(history, found), found),
@@ -232,23 +224,18 @@ class _Search:
         tolerance = _ROUGHLY if self.rough else self.problem.plan.optimizer.tolerance
         return self.problem.improved(self.field, start, tolerance, self.most_steps, warm=warm)
 
-    def best(
-        self,
-        values: Mapping[str, float],
-        flights: Mapping[str, Trajectory],
-        within: float = _EQUAL,
-    ) -> str:
-        """Return which of the `flights` with values `within` the best one's delivers most.
+    def best(self, values: Mapping[str, float], flights: Mapping[str, Trajectory]) -> str:
+        """Return which of the `flights` with values within `ROUGH` of the best delivers most.
 
         A route and its mirror image have the same R_avg, and may deliver very different amounts.
         """
-        most = max(values.values())
+        most = max(values.values()) - ROUGH
 
         def delivered(name: str) -> float:
             rates = self.field.value(flights[name].w.T)
             return round(objective(rates, self.problem.kinematics, self.problem.relay) / _EQUAL)
 
-        return max((name for name in values if values[name] > most - within), key=delivered)
+        return max((name for name in values if values[name] > most), key=delivered)
 
     def sharpened(self, optima: list[LocalOptimum]) -> LocalOptimum:
         """Return the best by the steps themselves of `optima` and of those for sharper steps."""
