@@ -51,6 +51,9 @@ _EQUAL = 1e-6
 """The difference of values, bit/s/Hz, below which flights are equally good: which of two is larger
 is then up to rounding, and differs from machine to machine. Chosen."""
 
+_FOLLOWED = 2
+"""Starts over a map that are improved: the best as they are. Chosen."""
+
 _ROUGHLY, _ROUGH_STEPS, _ROUGH_CELLS = 1e-2, 12, 800
 """Tolerance, bit/s/Hz, of a rough flight, steps of its search, twice as many with a least speed,
 and cells of its path over a map. Measured with the user dragged by 70 to 100 m: `copter_relay.yaml`
@@ -93,13 +96,16 @@ def direct(
         better = [name for name in routes if values[name] > begun[name]]
         flights |= {name: improved[name] for name in better}
         reached |= {name: values[name] for name in better}
-    going = search.best(reached, flights)
-    tell(2, "the best start", reached[going])
+    going = [search.best(reached, flights)]
+    if problem.mapped:
+        going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]
+    tell(2, "the best start", reached[going[0]])
     warm = several or (rough and alone and problem.kinematics.min_speed == 0)
-    best = search.followed(flights[going], warm=warm)
-    end = search.value(best.trajectory)
+    optima = {name: search.followed(flights[name], warm=warm) for name in going}
+    ends = {name: search.value(each.trajectory) for name, each in optima.items()}
+    best = max(optima.values(), key=lambda each: each.value)
     if isinstance(own_steps, RateSteps) and not rough:
-        best = search.sharpened([best, replace(best, trajectory=flights[going])])
+        best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
     if any(problem.plan.radio.spreads) and not rough:
         best = search.under_shadowing(best)
     flight = best.trajectory
@@ -116,7 +122,7 @@ def direct(
     found = solution.maximised
     # values by tables may be above those of the precoders, and without shadowing more is delivered
     history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
-    reached[going] = end
+    reached |= ends
     return replace(
         solution,
         history=np.append(np.minimum(history, found), found),

@@ -163,14 +163,12 @@ def _shifted(link: Link, kind: Kind, cosine: Real) -> tuple[Real, Real]:
     if kind != "modes":
         return np.full(cosine.shape, snr), cosine if kind == "surface" else np.zeros(cosine.shape)
     H_r = link.fade(link.line_of_sight_at(cosine))
-    if link.steps is not None:
+    if link.steps is not None or min(link.receive, link.transmit) == 1:
         mode = np.linalg.norm(H_r, 2, axis=(-2, -1))
         return 2 * np.log(mode) + snr, np.zeros_like(mode)
     if H_r.shape[-2] > H_r.shape[-1]:
         H_r = np.swapaxes(H_r, -1, -2)
     trace = np.sum(H_r.real**2 + H_r.imag**2, axis=(-2, -1))
-    if H_r.shape[-2] == 1:
-        return np.log(trace) + snr, np.zeros_like(trace)
     gram = H_r @ H_r.conj().mT
     apart = np.hypot((gram[..., 0, 0] - gram[..., 1, 1]).real, 2 * np.abs(gram[..., 0, 1]))
     ratio = np.sqrt(np.maximum(trace - apart, 0) / (trace + apart))

@@ -223,11 +223,10 @@ class AxisBound:
         """
         p = np.clip(np.array(prices), 0.0, 1.0)
         count = len(self.t)
-        before = self._since(range(count // 2 + 1), 0, p)
-        if count > count // 2 + 1:
-            before += self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
         ends = np.array([at_ends(self.problem, self.rates, price) for price in p.tolist()])
-        through = before + ends[:, None, None]
+        before = self._since(range(count // 2 + 1), 0, p)
+        after = self.reached(self._since(range(count - 1, count // 2, -1), 1, p), 1)
+        through = before + after + ends[:, None, None]
         return float(through.min(axis=0).max()) / self.problem.kinematics.slots
 
     def _since(self, order: range, end: int, prices: Real) -> Real:
@@ -236,18 +235,14 @@ class AxisBound:
         Of all parts of the flights the best counts, from some time after they are parted on.
         """
         kin, when, parts = self.problem.kinematics, *self.passed
-        values: Real | None = None
+        values = np.zeros((len(parts[end]), 1, len(self.columns), len(self.x)))
         for k in order:
             t = float(self.t[k])
             since = kin.time_step * (kin.slots - 1) - t if end else t
             across = parts[end] if since < _MERGED * when else self.across[None]
-            worth = self.rewards(k, prices, across)
-            if values is not None:
-                if len(values) > len(across):
-                    values = values.max(axis=0, keepdims=True)
-                worth += self.reached(values, 1 if end else -1)
-            values = worth
-        assert values is not None
+            if len(values) > len(across):
+                values = values.max(axis=0, keepdims=True)
+            values = self.reached(values, 1 if end else -1) + self.rewards(k, prices, across)
         return np.asarray(values.max(axis=0))
 
 

@@ -43,8 +43,7 @@ class BestRates:
     def at(self, link: int, slot: int, gain_log: Real) -> Real:
         """Return the most that `link` has in `slot` at l up to `gain_log` (...), bits."""
         row = self.values[link, slot if self.known else 0]
-        found = np.interp(gain_log.ravel(), self.gain_logs[link], row)
-        return np.asarray(found.reshape(gain_log.shape))
+        return np.asarray(np.interp(gain_log, self.gain_logs[link], row))
 
 
 def best_rates(problem: Problem) -> BestRates:

@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from faao_mav.arrays import Flags, Real
-from faao_mav.mission.fence_area import FreeArea
 from faao_mav.optimizer.design import design
 from faao_mav.optimizer.interior.constraint import ALLOWED, W, every_excess
 from faao_mav.optimizer.interior.limits import Disc
@@ -27,7 +26,7 @@ from faao_mav.optimizer.kinematics import LENGTH, Trajectory
 from faao_mav.optimizer.problem import Problem
 from faao_mav.optimizer.rates.field import Blurred, RateField, rate_field
 from faao_mav.optimizer.search.map_bound import places_about
-from faao_mav.optimizer.search.straight import straight_flight, with_stops
+from faao_mav.optimizer.search.straight import straight_flight
 from faao_mav.optimizer.search.sweep import NOWHERE, Cells, cells_of, largest_ahead
 from faao_mav.radio.gain import GainField
 from faao_mav.radio.relay import RelayQueue
@@ -153,8 +152,7 @@ def starts_over_map(
 def flights_over_map(problem: Problem, field: RateField, cells: int) -> Iterator[Trajectory]:
     """Yield flights that keep the fence along paths over so many `cells`.
 
-    The farthest from obstacles come first. Of a path they are the nearest, and that which stops
-    where the way bends about obstacles.
+    The farthest from obstacles come first.
     """
     kin, area, path = problem.kinematics, problem.free_area, np.empty((0, 2))
     limits = (*constraints_of(kin), *problem.fenced(kin))
@@ -165,44 +163,12 @@ def flights_over_map(problem: Problem, field: RateField, cells: int) -> Iterator
         if np.array_equal(before, path):
             continue
         at = np.concatenate([[0.0], sweep.cells.instants, t[-1:]])
-        at, places = _around(area, at, np.vstack([kin.start, path, kin.end]))
+        places = np.vstack([kin.start, path, kin.end])
         along = np.stack([np.interp(t, at, each) for each in places.T], axis=1)
         about = problem.fenced(kin, (along, _NEAR * sweep.cells.side))
-        flights = [nearest_flight(kin, along, straight_flight(kin), about)]
-        if area is not None and kin.min_speed == 0:
-            bends = _bends(area, places)
-            flights.append(with_stops(kin, [*places[bends]], at[bends]))
-        for flight in flights:
-            if flight is not None and every_excess(kin, limits, flight) <= ALLOWED:
-                yield flight
-
-
-def _bends(area: FreeArea, places: Real) -> list[int]:
-    """Return which of `places` (k, 2) a way needs: from one each time to the last in its sight."""
-    found, last = [0], len(places) - 1
-    while found[-1] < last:
-        ahead = range(last, found[-1] + 1, -1)
-        seen = (k for k in ahead if area.covers_path(places[[found[-1], k]]))
-        found.append(next(seen, found[-1] + 1))
-    return found[1:-1]
-
-
-def _around(area: FreeArea | None, t: Real, places: Real) -> tuple[Real, Real]:
-    """Return `places` (k, 2) at times `t` (k,) with the corners of ways within an `area` between.
-
-    A step of the path is straight, and may cut the corner of an obstacle.
-    """
-    times, ways = [t[:1]], [places[:1]]
-    for k in range(len(t) - 1):
-        way = places[k : k + 2]
-        if area is not None and not area.covers_path(way):
-            around = area.shortest_way(*way)
-            way = way if around is None else around
-        gone = np.cumsum(np.hypot(*np.diff(way, axis=0).T))
-        share = gone / gone[-1] if gone[-1] else np.ones(1)
-        times.append(t[k] + (t[k + 1] - t[k]) * share)
-        ways.append(way[1:])
-    return np.concatenate(times), np.concatenate(ways)
+        flight = nearest_flight(kin, along, straight_flight(kin), about)
+        if flight is not None and every_excess(kin, limits, flight) <= ALLOWED:
+            yield flight
 
 
 def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.0) -> QueueSweep:

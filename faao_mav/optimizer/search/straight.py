@@ -129,13 +129,10 @@ def _flight_aside(kin: Kinematics) -> Trajectory:
     return flight
 
 
-def with_stops(
-    kin: Kinematics, stops: Sequence[Real], times: Real | None = None
-) -> Trajectory | None:
+def with_stops(kin: Kinematics, stops: Sequence[Real]) -> Trajectory | None:
     """Return the flight that stops at `stops`, straight between them; None if the time is short.
 
-    Between stops it is as quick as it can be. It leaves them as near to `times`, s, as the others
-    allow; without, it hovers at each for an even part of the rest.
+    Between stops it is as quick as it can be; it hovers at each for an even part of the rest.
     """
     if not len(stops):
         return straight_flight(kin)
@@ -159,11 +156,8 @@ def with_stops(
     spare = kin.slots - 1 - int(begins[-1])
     if spare < 0:
         return None
-    share = np.arange(1, len(legs)) / len(stops)
-    waited = spare * share if times is None else times / kin.time_step - begins[1:-1]
-    waited = np.maximum.accumulate(np.clip(np.rint(waited), 0, spare)).astype(int)
+    delays = np.rint(spare * np.arange(len(legs)) / len(stops)).astype(int)
     velocities = np.zeros((kin.slots, 2))
-    delays = np.array([0, *waited[:-1], spare])
     for begin, leg in zip(begins[:-1] + delays, legs, strict=True):
         velocities[begin : begin + len(leg)] = leg
     return kin.follow(velocities)
