@@ -92,10 +92,9 @@ def direct(
     flights, reached, several = dict(routes), dict(begun), len(routes) > 1
     if several and not problem.mapped:
         improved = improve_starts(problem, search.field, routes, search.most_steps)
-        values = {name: search.value(flight) for name, flight in improved.items()}
-        better = [name for name in routes if values[name] > begun[name]]
-        flights |= {name: improved[name] for name in better}
-        reached |= {name: values[name] for name in better}
+        for name, flight in improved.items():
+            if (value := search.value(flight)) > begun[name]:
+                flights[name], reached[name] = flight, value
     going = [search.best(reached, flights)]
     if problem.mapped:
         going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]

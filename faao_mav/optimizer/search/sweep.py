@@ -18,9 +18,6 @@ from faao_mav.optimizer.kinematics import Kinematics
 CORNER = np.sqrt(0.5)
 """Distance of a cell's corners from its centre, in sides of the cell."""
 
-_THINNEST = 0.02
-"""Least width of the map, in its length: stations and ends may lie on one line. Chosen."""
-
 NOWHERE = -1e9
 """What is to be had where no flight can be: less than any bits."""
 
@@ -63,16 +60,12 @@ def disc(step: float, beyond: float = 1) -> list[tuple[int, int]]:
 
 def largest_near(values: Real, rows: Sequence[tuple[int, int]]) -> Real:
     """Return the largest of `values` (..., i, j) in a `disc` of `rows` about each place."""
-    best = np.full_like(values, -np.inf)
+    best, count = np.full_like(values, -np.inf), values.shape[-2]
     within = largest_within(values, (columns for _, columns in rows))
-    for row, columns in rows:
-        near = within[columns]
-        if row == 0:
-            np.maximum(best, near, out=best)
-        elif row < values.shape[-2]:
-            above, below = best[..., row:, :], best[..., :-row, :]
-            np.maximum(above, near[..., :-row, :], out=above)
-            np.maximum(below, near[..., row:, :], out=below)
+    for row, columns in rows[:count]:
+        near, above, below = within[columns], best[..., row:, :], best[..., : count - row, :]
+        np.maximum(above, near[..., : count - row, :], out=above)
+        np.maximum(below, near[..., row:, :], out=below)
     return best
 
 
@@ -127,7 +120,7 @@ def cells_of(
         reached = kin.start - since[-1], kin.start + since[-1]  # corners beyond are drawn nearer
         corners = np.vstack([corners, np.clip(inner, *reached)])
     low, high = corners.min(axis=0), corners.max(axis=0)
-    extent = np.maximum(high - low, _THINNEST * float((high - low).max()) + 1.0)
+    extent = np.maximum(high - low, 1.0)  # stations and ends may lie on one line
     duration = kin.time_step * (kin.slots - 1)
     side = max(
         float(np.sqrt(extent.prod() / cells)), kin.max_speed * duration / (reach * MOST_INSTANTS)
