@@ -89,7 +89,7 @@ def by_direct(read: Plan) -> tuple[float, float, float]:
 
     with (
         patch("faao_mav.optimizer.direct.rate_field", timed(rate_field)),
-        patch.object(direct, "_precoders", timed(direct._precoders)),
+        patch.object(direct._Search, "precoders", timed(direct._Search.precoders)),
         patch.object(direct, "_WIDTHS", ()),  # steps of a radio's rates as wide as the peer's
     ):
         began = time.process_time()

@@ -31,7 +31,7 @@ from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
-from faao_mav.optimizer.search.over_map import ROUGHLY, improved_over_map, starts_over_map
+from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
 from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, sparing_starts, starts
 from faao_mav.optimizer.shadowing import SHADES, shaded, under_shadowing
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
@@ -54,11 +54,12 @@ is then up to rounding, and differs from machine to machine. Chosen."""
 _FOLLOWED = 2
 """Starts over a map that are improved: the best as they are. Chosen."""
 
-_ROUGHLY, _ROUGH_STEPS, _ROUGH_CELLS = 1e-2, 12, 800
-"""Tolerance, bit/s/Hz, of a rough flight, steps of its search, twice as many with a least speed,
-and cells of its path over a map. Measured with the user dragged by 70 to 100 m: `copter_relay.yaml`
-0.14 % below the finished flight, `plane_relay.yaml` 0 to 3 % from a finished flight nearby, 22 to
-25 % from none."""
+_ROUGHLY, _ROUGH_STEPS = 1e-2, 12
+"""Tolerance, bit/s/Hz, and steps of the search of a rough flight, twice as many with a least speed.
+
+Measured with the user dragged by 70 to 100 m: `copter_relay.yaml` 0.14 % below the finished flight,
+`plane_relay.yaml` 0 to 3 % from a finished flight nearby, 22 to 25 % from none.
+"""
 
 
 def direct(
@@ -109,7 +110,7 @@ def direct(
         best = search.under_shadowing(best)
     flight = best.trajectory
     precoders = [
-        _precoders(link, rate, scheme, flight.w, rough=rough)
+        search.precoders(link, rate, flight.w)
         for link, rate in zip(search.field.links, search.field.rates, strict=True)
     ]
     ending = f"stationary to {best.residual:.1e}"
@@ -192,8 +193,7 @@ class _Search:
         one = alone or self.rough or problem.mapped
         names = ("straight",) if one else problem.plan.optimizer.starts
         if problem.mapped and not alone:
-            cells = (_ROUGH_CELLS,) if self.rough else ()
-            routes = starts_over_map(problem, self.field, cells)
+            routes = starts_over_map(problem, self.field, rough=self.rough)
         if not routes:
             routes = starts(kin, names, stations, problem.free_area, fenced)
         if before is not None:
@@ -223,11 +223,11 @@ class _Search:
 
     def followed(self, start: Trajectory, *, warm: bool = True) -> LocalOptimum:
         """Return what is found from `start`: over maps close by, by the maps as they are."""
-        if self.problem.mapped:
-            how = (ROUGHLY, 1) if self.rough else ()
-            return improved_over_map(self.problem, self.field, start, self.most_steps, *how)
-        tolerance = _ROUGHLY if self.rough else self.problem.plan.optimizer.tolerance
-        return self.problem.improved(self.field, start, tolerance, self.most_steps, warm=warm)
+        problem, field, steps = self.problem, self.field, self.most_steps
+        if problem.mapped:
+            return improved_over_map(problem, field, start, steps, rough=self.rough)
+        tolerance = _ROUGHLY if self.rough else problem.plan.optimizer.tolerance
+        return problem.improved(field, start, tolerance, steps, warm=warm)
 
     def best(self, values: Mapping[str, float], flights: Mapping[str, Trajectory]) -> str:
         """Return which of the `flights` with values within `ROUGH` of the best delivers most.
@@ -265,21 +265,21 @@ class _Search:
 
         return max(found, key=lambda each: value(each.trajectory.w))
 
+    def precoders(self, link: Link, rate: RateModel, w: Real) -> Complex:
+        """Return the precoders at positions w (n, 2), searched from the best that `rate` knows.
 
-def _precoders(link: Link, rate: RateModel, scheme: Design, w: Real, *, rough: bool) -> Complex:
-    """Return the precoders at positions w (n, 2), searched from the best that `rate` knows.
-
-    With known draws they are searched afresh too, and the better kept; if `rough` none is searched.
-    """
-    H = link.channel(w)
-    near = rate.initial_precoders(*link_coordinates(link, w.T)) if scheme.optimal else None
-    if near is None:
-        return scheme.precoders(link, H)
-    if link.measure != "cutoff" or rough:
-        return near
-    carried = scheme.precoders(link, H, start=near)
-    if scheme.averaged or link.nlos is None:
-        return carried
-    afresh = scheme.precoders(link, H)
-    better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
-    return np.asarray(np.where(better[:, None, None], carried, afresh))
+        With known draws they are searched afresh too, and the better kept. Rough ones are not
+        searched.
+        """
+        H, scheme = link.channel(w), self.scheme
+        near = rate.initial_precoders(*link_coordinates(link, w.T)) if scheme.optimal else None
+        if near is None:
+            return scheme.precoders(link, H)
+        if link.measure != "cutoff" or self.rough:
+            return near
+        carried = scheme.precoders(link, H, start=near)
+        if scheme.averaged or link.nlos is None:
+            return carried
+        afresh = scheme.precoders(link, H)
+        better = scheme.rate(link, H, carried) > scheme.rate(link, H, afresh)
+        return np.asarray(np.where(better[:, None, None], carried, afresh))

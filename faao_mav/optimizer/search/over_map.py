@@ -7,7 +7,7 @@ Made a flight, it is improved in a tube about it, on the mean of the rates about
 less and less of them. What counts is always the map as it is.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -31,8 +31,9 @@ from faao_mav.optimizer.search.sweep import NOWHERE, Cells, cells_of, largest_ah
 from faao_mav.radio.gain import GainField
 from faao_mav.radio.relay import RelayQueue
 
-CELLS, _LEVELS, _REACH = (3_000, 5_000), 30, 4.0
-"""Cells of the map for each of the paths, levels of the queue, and cells that a step reaches.
+CELLS, _ROUGH_CELLS, _LEVELS, _REACH = (3_000, 5_000), 800, 30, 4.0
+"""Cells of the map for each of the paths and for that of a rough flight, which takes a tenth of a
+second, levels of the queue, and cells that a step reaches.
 Measured on six sites with ridges: paths over cells of several sizes differ by up to 5 %."""
 
 _BETWEEN = 0.4
@@ -56,9 +57,6 @@ _SHARES = (0.0, 0.5, 1.0)
 
 _LEAST = 1e-9
 """Bits of the queue's highest level at least: there are levels where nothing is received."""
-
-ROUGHLY = _NARROWING[1:2]
-"""The search of them that a rough flight has."""
 
 _AGAIN, _MOST = 5e-3, 20
 """The gain, in shares of what there is, above which a search is made again from where it ended, and
@@ -137,11 +135,11 @@ class QueueSweep:
 
 
 def starts_over_map(
-    problem: Problem, field: RateField, cells: Sequence[int] = ()
+    problem: Problem, field: RateField, *, rough: bool = False
 ) -> dict[str, Trajectory]:
-    """Return the best flights along paths over `cells` (or `CELLS`) cells: `map`, `map 2` ..."""
+    """Return the best flights along paths over so many cells: `map`, `map 2` and on."""
     found: dict[str, Trajectory] = {}
-    for count in cells or CELLS:
+    for count in (_ROUGH_CELLS,) if rough else CELLS:
         flights = [*flights_over_map(problem, field, count)]
         if flights:
             best = max(flights, key=lambda flight: _worth(problem, field, flight))
@@ -217,12 +215,12 @@ def improved_over_map(
     field: RateField,
     start: Trajectory,
     iterations: int,
-    searches: Sequence[tuple[float, float]] = _NARROWING,
-    most: int = _MOST,
+    *,
+    rough: bool = False,
 ) -> LocalOptimum:
     """Return the best of `start` and of what searches in tubes about it end in, by `field`.
 
-    One that gains much is made again, at `most` so often.
+    One that gains much is made again, unless it is to be `rough`.
     """
     kin, relay = problem.kinematics, problem.maximised_queue
     smooth, side = field.over(GainField.smoothed), _side(problem, CELLS[0])
@@ -230,8 +228,8 @@ def improved_over_map(
 
     now, worth = start, _worth(problem, field, start)
     best = LocalOptimum(start, worth, 0, np.inf, False)
-    for radius, spread in searches:
-        for _ in range(most):
+    for radius, spread in _NARROWING[1:2] if rough else _NARROWING:
+        for _ in range(1 if rough else _MOST):
             found = maximize(
                 kin,
                 Blurred(smooth, spread * side),
