@@ -23,7 +23,7 @@ from faao_mav.optimizer.search.axis_bound import AxisBound
 from faao_mav.optimizer.search.best_rates import BestRates, best_at, best_rates
 from faao_mav.optimizer.search.bound import upper_bound
 from faao_mav.optimizer.search.map_bound import MapBound, map_bound
-from faao_mav.optimizer.search.sweep import Cells, cells_of, largest_near
+from faao_mav.optimizer.search.sweep import Cells, cells_of, disc, largest_near
 from faao_mav.plan import Plan, read_plan
 
 KINDS = changes_in(MISSIONS.parent / "tests" / "data" / "bounded.yaml")
@@ -165,7 +165,7 @@ def test_a_step_over_the_map_reaches_every_cell_that_v_max_does(small_plan: Make
     apart = np.maximum(0.0, np.abs(flat[:, :, None] - flat[:, None]) - cells.side)
     reached = np.hypot(*apart) <= step * (1 + 1e-12)
     best = np.where(reached, values.reshape(2, 1, -1), -np.inf).max(axis=-1)
-    assert largest_near(values, cells.rows).reshape(2, -1) == pytest.approx(best)
+    assert largest_near(values, disc(cells.step)).reshape(2, -1) == pytest.approx(best)
 
 
 @given(seed=st.integers(0, 2**31))
@@ -182,7 +182,7 @@ def test_an_outward_map_misses_no_flight(small_plan: MakePlan, seed: int) -> Non
     assert sweep.alive[np.arange(len(cell)), *cell.T].all()
     reached = {
         (s * row, column)
-        for row, most in sweep.rows
+        for row, most in disc(sweep.step)
         for s in (1, -1)
         for column in range(-most, most + 1)
     }

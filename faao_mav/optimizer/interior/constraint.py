@@ -110,10 +110,9 @@ class Constraint(ABC):
 
     def on(self, grid: Grid, rows: int) -> Flags:
         """Return where each of the `rows` of g holds, (rows, n): where an unknown of it is free."""
-        free = grid.free[list(self.of)].any(axis=0)
-        if set(self.of) & set(A):
-            free = grid.bounded
-        return np.broadcast_to(free, (rows, grid.slots))
+        accelerated = bool(set(self.of) & set(A))
+        on = grid.bounded if accelerated else grid.free[list(self.of)].any(axis=0)
+        return np.broadcast_to(on, (rows, grid.slots))
 
 
 def unknowns(kin: Kinematics, flight: Trajectory) -> Real:

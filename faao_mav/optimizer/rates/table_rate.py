@@ -144,9 +144,8 @@ def table_rates(links: Sequence[tuple[Link, Real]], design: Design) -> tuple[Tab
         kind = kind_of(link, design)
         assert kind is not None
         kinds.append(kind)
-        moving = link.follows_position and kind == "modes"
-        directions = np.linspace(-1, 1, _DIRECTIONS) if moving else np.zeros(1)
-        slots = 1 if kind != "modes" or link.nlos is None else link.nlos.shape[-3]
+        directions = np.linspace(-1, 1, _DIRECTIONS) if link.follows_position else np.zeros(1)
+        slots = 1 if link.nlos is None else link.nlos.shape[-3]
         shifts = np.array([_shifted(link, kind, np.full(slots, u))[0] for u in directions])
         ranges.append((float(span.min() + shifts.min()), float(span.max() + shifts.max())))
     if kinds and all(kind == "modes" for kind in kinds):

@@ -97,12 +97,12 @@ class MapBound:
             return np.where(self.cells.alive[k], found, -np.inf)
 
         def swept(runs: Iterable[int], end: Real) -> Real:
-            best = end[:, None, None]
+            best, rows = end[:, None, None], disc(self.cells.step)
             for k in runs:
                 best = worth(k) + best
                 if queue is not None:
                     best = np.minimum.accumulate(best, axis=0)
-                best = largest_near(best, self.cells.rows)
+                best = largest_near(best, rows)
             return best
 
         runs = range(len(blocks))

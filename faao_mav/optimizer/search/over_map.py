@@ -198,7 +198,6 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
     fields = [field.over(GainField.in_slots, slot) for slot in slots]
     rates = np.stack([each.value(found.x[..., None])[..., 0] for each in fields], axis=1)
     counts = np.array([len(block) for block in found.blocks])
-    step = kin.max_speed * float(np.diff(found.instants).max(initial=0.0)) / found.side
     return QueueSweep(
         found,
         counts[:, None, None] * rates,
@@ -206,7 +205,7 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
         relay,
         kin.time_step,
         inside,
-        step + _BETWEEN,
+        found.step + _BETWEEN,
     )
 
 

@@ -31,9 +31,8 @@ class Cells:
 
     `x` (2, i, j) are the centres of the cells, m, `side` theirs; `blocks` the K runs of slots
     between the first and the last, which are at given places, and `instants` (K,) their mean times,
-    s. `alive` (K, i, j) tells where a flight can be at an instant. `rows` is what a step from one
-    instant to the next reaches: by how many rows to either side, and how many columns there. A step
-    may pass through an obstacle that is thinner than it is long.
+    s. `alive` (K, i, j) tells where a flight can be at an instant. A `step` from one instant to the
+    next is so many sides long, and may pass through an obstacle that is thinner.
     """
 
     x: Real
@@ -41,7 +40,7 @@ class Cells:
     blocks: list[Integers]
     instants: Real
     alive: Flags
-    rows: list[tuple[int, int]]
+    step: float
 
 
 def disc(step: float, beyond: float = 1) -> list[tuple[int, int]]:
@@ -141,9 +140,8 @@ def cells_of(
         # the way is convex in time up to v_max and straight beyond: never above its chords
         way = np.interp(instants, t, ways) + CORNER * side
         alive &= np.hypot(*(x - end[:, None, None])) <= way[:, None, None]
-    inside = np.ones(x.shape[1:], dtype=np.bool_)
     if free is not None:
         area = FreeArea(free.shape.buffer(CORNER * side))
-        inside = area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
+        alive &= area.covers(x.reshape(2, -1).T).reshape(x.shape[1:])
     step = kin.max_speed * float(np.diff(instants).max(initial=0.0)) / side
-    return Cells(x, side, blocks, instants, alive & inside, disc(step))
+    return Cells(x, side, blocks, instants, alive, step)
