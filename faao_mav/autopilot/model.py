@@ -7,14 +7,14 @@ velocities and accelerations across the ground are complex in steps: east + i no
 import math
 from abc import ABC, abstractmethod
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from faao_mav.arrays import Flags, Real
+from faao_mav.arrays import Complex, Flags, Real
 from faao_mav.autopilot.body import CopterBody
 from faao_mav.autopilot.parameter import Parameter, ParameterValues, in_si
 from faao_mav.errors import InputError
@@ -24,6 +24,52 @@ from faao_mav.vector import Vector
 LONGEST = 21_600.0
 """The longest flight that is followed, s. Chosen: fuzzing took one of almost a day beyond 500 MB of
 memory, which six hours stay below."""
+
+
+STEP = 0.1  # The longest step of a flight, s: the one that the models were calibrated with.
+SHORTEST = 2e-3  # The shortest step towards a waypoint, s. Chosen.
+TINY = 1e-9  # What is shorter, m, has no direction.
+
+
+def unit(way: complex) -> complex:
+    """Return the direction of `way`, 0 for none."""
+    return way / abs(way) if abs(way) > TINY else 0j
+
+
+@dataclass(frozen=True, slots=True)
+class Orbit:
+    """A circle about the place of an item: `radius`, m, and the greatest `turn_rate`, rad/s.
+
+    It is flown for so many `turns`, or for so many `seconds`; if it `climbs` until it is at its
+    height, and if it is `endless` for good, of which `turns` are predicted. `clockwise` as seen
+    from above. Places are m east + i m north.
+    """
+
+    radius: float
+    clockwise: bool
+    turns: float = 0.0
+    seconds: float = 0.0
+    climbs: bool = False
+    endless: bool = False
+    turn_rate: float = math.inf
+
+    def speed(self, commanded: float) -> float:
+        """Return the speed along the circle, m/s, where `commanded` is flown on straights."""
+        return min(commanded, self.turn_rate * self.radius)
+
+    def lasting(self, commanded: float) -> float:
+        """Return how long it is flown, s, without the climb of one that does."""
+        return max(self.turns * 2 * math.pi * self.radius / self.speed(commanded), self.seconds)
+
+    def edge(self, center: complex, towards: complex) -> complex:
+        """Return the place of the circle about `center` that is nearest to `towards`, m."""
+        return center + self.radius * (unit(towards - center) or 1j)
+
+    def outline(self, center: complex, corners: int = 72) -> Complex:
+        """Return a closed polygon (corners + 1,) around the circle about `center`, m."""
+        angle = np.linspace(0.0, 2 * np.pi, corners + 1)
+        wide = self.radius / math.cos(np.pi / corners)
+        return np.asarray(center + 1j * wide * np.exp(-1j * angle))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +85,7 @@ class FlightPath:
 
     Heights count from `elevation`, m above sea level. The air moves at `wind`, east and north, m/s,
     steadily and everywhere. An aeroplane comes over the first point at the velocity `entry` (3,),
-    m/s, where one is given.
+    m/s, where one is given, and circles about the points that have one of `orbits`.
     """
 
     points: Real
@@ -51,6 +97,7 @@ class FlightPath:
     elevation: float = 0.0
     entry: Real | None = None
     wind: Vector = (0.0, 0.0)
+    orbits: Mapping[int, Orbit] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -225,16 +272,6 @@ class Model(ABC):
     def speed_rates(self) -> SpeedRates:
         """How fast its airspeed changes; infinitely if that is its acceleration's."""
         return SpeedRates()
-
-
-STEP = 0.1  # The longest step of a flight, s: the one that the models were calibrated with.
-SHORTEST = 2e-3  # The shortest step towards a waypoint, s. Chosen.
-TINY = 1e-9  # What is shorter, m, has no direction.
-
-
-def unit(way: complex) -> complex:
-    """Return the direction of `way`, 0 for none."""
-    return way / abs(way) if abs(way) > TINY else 0j
 
 
 class Copter:

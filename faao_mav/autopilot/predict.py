@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.model import LONGEST, FlightPath, Track
+from faao_mav.autopilot.model import LONGEST, FlightPath, Orbit, Track
 from faao_mav.autopilot.vehicle import Vehicle
-from faao_mav.autopilot.vehicle_type import Orbit, height_above_home
+from faao_mav.autopilot.vehicle_type import height_above_home
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import FLOWN_TO, HOLDING, LANDINGS, TAKEOFFS, Command
@@ -101,6 +101,7 @@ class _Stop(NamedTuple):
     hold: float = 0.0
     spline: bool = False
     radius: float = 0.0
+    orbit: Orbit | None = None
 
 
 @dataclass
@@ -176,7 +177,8 @@ class _Walk:
         stops, self._stretch = [_Stop(self._place, 0), *self._stretch], []
         if len(stops) == 1:
             return
-        points, items, speeds, holds, splines, radii = map(np.array, zip(*stops, strict=True))
+        *told, orbits = zip(*stops, strict=True)
+        points, items, speeds, holds, splines, radii = map(np.array, told)
         home, on_its_way = self._mission.home, not self._type.hovers and len(self._parts) > 0
         path = FlightPath(
             points=points,
@@ -188,6 +190,7 @@ class _Walk:
             elevation=0.0 if home is None or math.isnan(home.altitude) else home.altitude,
             wind=self._wind,
             entry=self._parts[-1][2][-1] if on_its_way else None,
+            orbits={k: orbit for k, orbit in enumerate(orbits) if orbit is not None},
         )
         # what it takes at least, without ramps
         ways = np.diff(path.points, axis=0)
@@ -215,32 +218,30 @@ class _Walk:
         self._reached[index] = self._clock
 
     def _circle(self, index: int, center: Real, orbit: Orbit) -> None:
-        """Fly to the nearest place of a circle about `center` (3,), then round it.
+        """Circle about `center` (3,), m: what hovers from the circle's nearest place on.
 
-        Speeds on it are those in calm air.
+        The speed at which it does is that in calm air.
         """
-        here, middle = self._last, complex(*center[:2])
-        edge = orbit.edge(middle, complex(*here[:2]))
-        up = here[2] if orbit.climbs else center[2]
-        self._towards(index, np.array([edge.real, edge.imag, up]))
+        self.over, lasting = self.over or orbit.endless, orbit.lasting(self._speed)
+        if not self._type.hovers:
+            self._check_clock(lasting)
+            self._stretch.append(_Stop(center, index, self._speed, orbit=orbit))
+            return
+        middle, height = complex(*center[:2]), center[2]
+        edge = orbit.edge(middle, complex(*self._last[:2]))
+        self._towards(index, np.array([edge.real, edge.imag, height]))
         self._fly()
-        rise = float(center[2] - self._place[2])
-        rate = self._vehicle.value("climb_speed" if rise > 0 else "descent_speed")
-        lasting = orbit.lasting(self._speed, abs(rise) / rate)
         if lasting >= _SHORTEST:
             t = self._times(lasting)
             # angles count from east to north
             turning = (-1j if orbit.clockwise else 1j) * orbit.speed(self._speed) / orbit.radius
             out = (edge - middle) * np.exp(turning * t)
-            along, climbs = turning * out, t < abs(rise) / rate
-            if self._type.hovers:
-                along[[0, -1]] = 0.0
-            up = self._place[2] + np.sign(rise) * np.minimum(rate * t, abs(rise))
-            position = np.stack([center[0] + out.real, center[1] + out.imag, up], axis=1)
-            climbing = np.where(climbs, np.sign(rise) * rate, 0.0)
-            self._show(index, t, position, np.stack([along.real, along.imag, climbing], axis=1))
+            along = turning * out
+            along[[0, -1]] = 0.0
+            position = [center[0] + out.real, center[1] + out.imag, np.full(len(t), height)]
+            velocity = [along.real, along.imag, np.zeros(len(t))]
+            self._show(index, t, np.stack(position, axis=1), np.stack(velocity, axis=1))
         self._reached[index] = self._clock
-        self.over = self.over or orbit.endless
 
     def _return(self, index: int) -> None:
         self._fly()

@@ -11,13 +11,8 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body, CopterBody
-from faao_mav.autopilot.model import Model
-from faao_mav.autopilot.vehicle_type import (
-    AutopilotFamily,
-    Orbit,
-    VehicleType,
-    lean_acceleration,
-)
+from faao_mav.autopilot.model import Model, Orbit
+from faao_mav.autopilot.vehicle_type import AutopilotFamily, VehicleType, lean_acceleration
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import Command, Frame

@@ -5,13 +5,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
-import numpy as np
-
-from faao_mav.arrays import Complex, Real
+from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body
 from faao_mav.autopilot.dialect import Dialect
 from faao_mav.autopilot.manners import Failsafe, FenceAction, Manners, Modes, SetpointRules
-from faao_mav.autopilot.model import Model, unit
+from faao_mav.autopilot.model import Model, Orbit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_SEA, Command, Frame
@@ -26,47 +24,6 @@ for corners. Chosen; what a change costs is not measured."""
 def lean_acceleration(angle: float) -> float:
     """Return the level acceleration at the lean or bank `angle`, rad, at constant height, m/s²."""
     return GRAVITY * math.tan(angle)
-
-
-@dataclass(frozen=True, slots=True)
-class Orbit:
-    """A circle about the place of an item: `radius`, m, and the greatest `turn_rate`, rad/s.
-
-    It is flown for so many `turns`, or for so many `seconds`; if it `climbs` until it is at its
-    height, and if it is `endless` for good. `clockwise` as seen from above. Places are m east + i m
-    north.
-    """
-
-    radius: float
-    clockwise: bool
-    turns: float = 0.0
-    seconds: float = 0.0
-    climbs: bool = False
-    endless: bool = False
-    turn_rate: float = math.inf
-
-    def speed(self, commanded: float) -> float:
-        """Return the speed along the circle, m/s, where `commanded` is flown on straights."""
-        return min(commanded, self.turn_rate * self.radius)
-
-    def lasting(self, commanded: float, climb: float = 0.0) -> float:
-        """Return how long it is flown, s; `climb` is how long the change of height takes, s.
-
-        Of an endless one it is one turn.
-        """
-        around = 2 * math.pi * self.radius / self.speed(commanded)
-        turns = max(self.turns, 1.0) if self.endless else self.turns
-        return max(turns * around, self.seconds, climb)
-
-    def edge(self, center: complex, towards: complex) -> complex:
-        """Return the place of the circle about `center` that is nearest to `towards`, m."""
-        return center + self.radius * (unit(towards - center) or 1j)
-
-    def outline(self, center: complex, corners: int = 72) -> Complex:
-        """Return a closed polygon (corners + 1,) around the circle about `center`, m."""
-        angle = np.linspace(0.0, 2 * np.pi, corners + 1)
-        wide = self.radius / math.cos(np.pi / corners)
-        return np.asarray(center + 1j * wide * np.exp(-1j * angle))
 
 
 def orbit_at(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
@@ -87,7 +44,7 @@ def orbit_at(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
         case Command.NAV_LOITER_TO_ALT:
             return Orbit(radius, clockwise, climbs=True)
         case Command.NAV_LOITER_UNLIM:
-            return Orbit(radius, clockwise, endless=True)
+            return Orbit(radius, clockwise, turns=1.0, endless=True)
     return None
 
 

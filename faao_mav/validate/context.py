@@ -12,7 +12,8 @@ import numpy as np
 from faao_mav.arrays import Complex
 from faao_mav.autopilot import Track, Vehicle
 from faao_mav.autopilot.dialect import SpeedChange
-from faao_mav.autopilot.vehicle_type import Orbit, height_above_home
+from faao_mav.autopilot.model import Orbit
+from faao_mav.autopilot.vehicle_type import height_above_home
 from faao_mav.geodesy import LocalFrame
 from faao_mav.mission.command import ABOVE_HOME, ABOVE_SEA, FLOWN_TO, LANDINGS, Command, Frame
 from faao_mav.mission.item import JUMPS, Mission, MissionItem, jump_target

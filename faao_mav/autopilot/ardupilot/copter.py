@@ -12,9 +12,9 @@ from faao_mav.autopilot.ardupilot.legs import FACTS, ArduCopterLimits, StraightL
 from faao_mav.autopilot.ardupilot.target import Target
 from faao_mav.autopilot.body import ARDUCOPTER_BODY
 from faao_mav.autopilot.manners import Modes, failsafes
-from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown
+from faao_mav.autopilot.model import STEP, Copter, Flight, FlightPath, Flown, Orbit
 from faao_mav.autopilot.parameter import ParameterValues, Recommended, parameters_of, table
-from faao_mav.autopilot.vehicle_type import Orbit, lean_acceleration, orbit_at
+from faao_mav.autopilot.vehicle_type import lean_acceleration, orbit_at
 from faao_mav.errors import InputError
 from faao_mav.mission.command import Command
 from faao_mav.mission.item import MissionItem

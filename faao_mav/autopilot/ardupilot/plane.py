@@ -19,6 +19,7 @@ from faao_mav.autopilot.model import (
     FlightPath,
     Flown,
     Model,
+    Orbit,
     SpeedRates,
     parameter,
     unit,
@@ -123,7 +124,8 @@ class _Flight(Flight):
     Guidance is Park, Deyst and How's (AIAA 2004-4900) in ArduPilot's form: with damping ζ and
     period T the aircraft aims at a point L = ζ T V / π ahead on its track, by the lateral
     acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
-    as in a coordinated turn.
+    as in a coordinated turn. Around a circle the track is its tangent, and η has what turns at its
+    radius, V² / R, beside; from afar it flies to the middle.
 
     The airspeed follows with the lag of the `body` a demand, which goes to what is commanded within
     `speed_rates`. The height is approached within the greatest climb and descent.
@@ -143,6 +145,7 @@ class _Flight(Flight):
         self._full_radius = plane.waypoint_radius / density_ratio(altitude)
         self._place, self._height, self._climb = self._places[0], self._heights[0], 0.0
         self._bank, self._demand, self._rates = 0.0, self._speeds[0], plane.speed_rates
+        self._circling = False
         if path.entry is None:
             way = next(filter(None, map(unit, np.diff(self._places).tolist())), 1j)
             across = (self._wind * way.conjugate()).imag / self._demand
@@ -165,7 +168,23 @@ class _Flight(Flight):
             turn = min(abs(cmath.phase(before.conjugate() * onward)) / (pi / 2), 1.0)
         while (away := self._away(k, unit(before), turn)) > 0:
             self.move(k, min(STEP, max(away / abs(self._velocity), SHORTEST)))
+        if (orbit := self._path.orbits.get(k)) is not None:
+            self._circle(k, orbit)
         self.move(k, FACTS.noticed)
+
+    def _circle(self, k: int, orbit: Orbit) -> None:
+        """Circle about point `k`; where that is too tight, turns of the heading count."""
+        end, start, turned = self.time + orbit.seconds, self._heading, 0.0
+        left, self._circling = -1 if orbit.clockwise else 1, True
+        while (
+            self.time < end
+            or max(turned, left * (self._heading - start)) < 2 * pi * orbit.turns
+            or (orbit.climbs and abs(self._heights[k] - self._height) > FACTS.climbed)
+        ):
+            out = self._place - self._places[k]
+            self.move(k, STEP)
+            turned += left * cmath.phase((self._place - self._places[k]) * out.conjugate())
+        self._circling = False
 
     def _away(self, k: int, way: complex, turn: float) -> float:
         """Return how far the aircraft is from where point `k` counts as reached, m."""
@@ -173,6 +192,8 @@ class _Flight(Flight):
         if radius <= 0:
             look_ahead = self._plane.look_ahead * abs(self._velocity)
             radius = min(self._full_radius, look_ahead) * turn
+        if (orbit := self._path.orbits.get(k)) is not None:
+            return abs(offset) - radius - orbit.radius
         return min((offset * way.conjugate()).real, abs(offset) - radius)
 
     @property
@@ -182,16 +203,26 @@ class _Flight(Flight):
 
     def _aim(self, k: int) -> tuple[complex, float]:
         """Return the direction to aim in on the leg to point `k`, and the height to be at, m."""
-        start, end = self._places[k - 1], self._places[k]
+        start, end = self._places[k - 1 : k + 1]
+        before, height = self._heights[k - 1 : k + 1]
+        orbit, ahead = self._path.orbits.get(k), self._plane.look_ahead * abs(self._velocity)
+        if orbit is not None and self._circling:
+            out = self._place - end
+            bend = 4 * self._plane.damping**2 * orbit.radius
+            inwards = min(max((abs(out) - orbit.radius) / ahead, -1.0), 1.0)
+            aside = math.asin(inwards) + math.asin(ahead / max(bend, ahead))
+            turn = pi / 2 + min(aside, pi / 2)  # at most straight to the middle
+            return unit(out) * cmath.rect(1.0, -turn if orbit.clockwise else turn), height
+        if orbit is not None and orbit.climbs:
+            height = before
         if start == end or (k == 1 and self._path.entry is not None):
-            return end - self._place, self._heights[k]
+            return end - self._place, height
         way = unit(end - start)
         offset = (self._place - start) * way.conjugate()
-        sine = offset.imag / (self._plane.look_ahead * abs(self._velocity))
+        sine = offset.imag / ahead
         sine = min(max(sine, -_INTERCEPT), _INTERCEPT)
         done = min(max(offset.real / abs(end - start), 0.0), 1.0)
-        height = self._heights[k - 1] + done * (self._heights[k] - self._heights[k - 1])
-        return way * cmath.rect(1.0, -math.asin(sine)), height
+        return way * cmath.rect(1.0, -math.asin(sine)), before + done * (height - before)
 
     def move(self, k: int, step: float) -> None:
         """Go on by `step` seconds on the leg to point `k`."""
