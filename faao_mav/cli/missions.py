@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import faao_mav.cli.shared as cli
-from faao_mav.errors import InputError, printable
+from faao_mav.errors import InputError, counted, printable
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def convert(
     items, names = len(read.mission.items), " and ".join(map(str, written.contents))
     cli.show(
         lambda: {"items": items, "lost": written.lost, "written": out},
-        lambda: [f"{items} items written to {names}"],
+        lambda: [f"{counted(items, 'item')} written to {names}"],
         as_json=as_json,
     )
 
@@ -228,7 +228,7 @@ def _lines(source: str, chosen_by: str, check: "Check") -> Iterator[str]:
 
     vehicle = check.vehicle
     yield (
-        f"{source}: {len(check.mission.items)} items, for "
+        f"{source}: {counted(len(check.mission.items), 'item')}, for "
         f"{vehicle.type.family.name} and a {vehicle.kind} ({chosen_by}); "
         f"parameters: {vehicle.source if vehicle.parameters else 'defaults'}"
     )

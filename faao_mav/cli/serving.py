@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 import typer
 
 import faao_mav.cli.shared as cli
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -149,7 +149,7 @@ def _diary() -> "Callable[[MockAutopilot], None]":
         for part in MissionType:
             rows = mock.lists.items(part)
             if rows != told.setdefault(part.title, rows):
-                typer.echo(f"{part.title}: {len(rows)} rows")
+                typer.echo(f"{part.title}: {counted(len(rows), 'row')}")
             told[part.title] = rows
         if mock.armed != told.setdefault("armed", mock.armed):
             typer.echo("armed" if mock.armed else "disarmed")

@@ -8,7 +8,7 @@ import typer
 
 import faao_mav.cli.shared as cli
 from faao_mav.cli.missions import choose_vehicle
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, counted
 from faao_mav.files import write_whole
 
 if TYPE_CHECKING:
@@ -122,12 +122,12 @@ def download(
     target = plan_target(Vehicle(found.autopilot, found.kind)) if found.vehicle else None
     written = cli.write_noted(mission, out, target)
     told = {
-        "fence": f"{len(mission.fence.areas)} fence areas",
-        "rally points": f"{len(mission.rally)} rally points",
+        "fence": counted(len(mission.fence.areas), "fence area"),
+        "rally points": counted(len(mission.rally), "rally point"),
     }
     told |= {part: f"{part} not read" for part in mission.unread}
     typer.echo(f"vehicle      {found}")
-    typer.echo(f"mission      {len(mission.items)} items, {', '.join(told.values())}")
+    typer.echo(f"mission      {counted(len(mission.items), 'item')}, {', '.join(told.values())}")
     for path in written.contents:
         typer.echo(f"written      {path}")
     for problem in held.problems:

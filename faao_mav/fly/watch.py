@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
+from faao_mav.errors import counted
 from faao_mav.fly.preflight import Clearance
 from faao_mav.fly.telemetry import PATIENCE, POSITION_RATE, Ending, Kind, Telemetry
 from faao_mav.wire import messages, protocol
@@ -305,7 +306,7 @@ class Watch(Machine[Ending]):
             self.gate.judge(seen, now, again=True)
             self.outcome = self.gate.refusal()
             if self.gate.is_clear:
-                orders = f"arming, and starting {seen.items} items"
+                orders = f"arming, and starting {counted(seen.items, 'item')}"
                 orders = "it is set to follow setpoints, then armed" if self.streams else orders
                 seen.told.append(f"its own checks pass: {orders}")
                 self._go_on(now)

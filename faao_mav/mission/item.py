@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, counted
 from faao_mav.mission.command import (
     CIRCLE,
     FENCE_RETURN_POINT,
@@ -64,7 +64,7 @@ class MissionItem:
         if not 0 <= self.frame <= 255:
             raise InputError(f"mission item: frame {self.frame}; expected 0 to 255")
         if len(self.params) != 4:
-            raise InputError(f"mission item: {len(self.params)} parameters; expected 4")
+            raise InputError(f"mission item: {counted(len(self.params), 'parameter')}; expected 4")
         if any(map(math.isinf, self.numbers)):
             raise InputError(
                 f"mission item: params {self.params}, x {self.x}, y {self.y}, z {self.z}; "
@@ -93,7 +93,7 @@ class Mission:
     >>> from faao_mav.mission.command import Command, Frame
     >>> there = MissionItem(Command.NAV_WAYPOINT, Frame.GLOBAL_RELATIVE_ALT, x=47.4, y=8.5, z=50.0)
     >>> Mission((there,), Home(47.39, 8.5, 440.0))
-    <Mission: 1 items, 0 zones, 0 rally points>
+    <Mission: 1 item, 0 zones, 0 rally points>
     """
 
     items: tuple[MissionItem, ...]
@@ -108,8 +108,8 @@ class Mission:
 
     def __repr__(self) -> str:
         """Say how large it is, in a line."""
-        zones, points = len(self.fence.areas), len(self.rally)
-        return f"<Mission: {len(self.items)} items, {zones} zones, {points} rally points>"
+        many = (self.items, "item"), (self.fence.areas, "zone"), (self.rally, "rally point")
+        return f"<Mission: {', '.join(counted(len(each), noun) for each, noun in many)}>"
 
     @property
     def first_place(self) -> LatLon | None:

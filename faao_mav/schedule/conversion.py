@@ -8,7 +8,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Vehicle
-from faao_mav.errors import InfeasibleError, InputError
+from faao_mav.errors import InfeasibleError, InputError, counted
 from faao_mav.mission.fence_area import FreeArea
 from faao_mav.mission.item import Mission
 from faao_mav.optimizer.solution import Solution
@@ -45,7 +45,7 @@ class Conversion:
 
     def __repr__(self) -> str:
         """Say how large the mission is, in a line."""
-        return f"<Conversion: {self.mission!r}, {len(self.parameters)} parameters>"
+        return f"<Conversion: {self.mission!r}, {counted(len(self.parameters), 'parameter')}>"
 
 
 def check_vehicle(plan: Plan) -> None:

@@ -59,7 +59,7 @@ class UploadReport:
                 if each.kind == "dropped":
                     lost.setdefault(each.field, []).append(each)
             for first, *more in lost.values():
-                so = f" (and so in {len(more)} more items)" if more else ""
+                so = f" (and so in {counted(len(more), 'more item')})" if more else ""
                 lines.append(f"not kept     {first}{so}")
         lines += [f"failed       {problem}" for problem in self.problems]
         if self.verified:

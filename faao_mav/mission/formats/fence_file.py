@@ -41,6 +41,8 @@ none of the first says more: "restricted field", "exclusion fence"."""
 _TRUTH = dict.fromkeys(("true", "1", "yes"), True) | dict.fromkeys(("false", "0", "no"), False)
 """What words of a property say, in lower case."""
 
+_WGS84 = re.compile(r"(?i)(.*[:/])?(CRS:?84|EPSG[:/]([\d.]*[:/])?4326)")
+
 _HOW = (
     "name it as an inclusion or an exclusion, or give it a property inclusion: true (stay in) or "
     "false (stay out)"
@@ -92,6 +94,9 @@ def geojson_fence(text: str) -> Fence:
 def _of_geojson(
     value: Json, properties: Mapping[str, object], around: tuple[str, ...]
 ) -> Iterator[DrawnZone]:
+    if value.get("crs") is not None:  # of GeoJSON before RFC 7946
+        named = value["crs"]["properties"]["name"]
+        named.checked(bool(_WGS84.fullmatch(str(named.value))), "WGS84, as EPSG:4326 or CRS84")
     match value["type"].value:
         case "FeatureCollection" | "GeometryCollection" as kind:
             name = value.members.get("name")

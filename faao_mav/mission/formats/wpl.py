@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from faao_mav.errors import MissionFileError, quote
+from faao_mav.errors import MissionFileError, counted, quote
 from faao_mav.mission.command import ABOVE_HOME, CIRCLE, FENCE_RETURN_POINT, POLYGON, Command, Frame
 from faao_mav.mission.fence import Fence
 from faao_mav.mission.formats.mission_file import MissionFile, left_out, zeros
@@ -160,7 +160,7 @@ class _Row:
         self.number, texts = number, re.split(r"[ \t]+", line)
         if len(texts) != len(_FIELDS):
             raise MissionFileError(
-                f"line {number}: {len(texts)} fields; expected {len(_FIELDS)}, "
+                f"line {number}: {counted(len(texts), 'field')}; expected {len(_FIELDS)}, "
                 f"tab-separated: {' '.join(_FIELDS)}"
             )
         self._texts = dict(zip(_FIELDS, texts, strict=True))
