@@ -33,12 +33,14 @@ _LEFT_OUT = {
     94: "descends until the ground has its load",
     207: "turns the fence off, or its floor",
     208: "releases the parachute",
+    218: "works a switch, perhaps that of the mode, the fence or the motors",
     42702: "leaves the aircraft to a script",
     42703: "holds an attitude, whatever way that is",
 }
-_HARMLESS = {207: (1,), 208: (0, 1)}
+_HARMLESS = {207: (1,), 208: (0, 1), 218: (0, 9, 15, 19, 27, 28, 34, 35, 36, 66, 67)}
 """What commands do that is not predicted, unless param1 is harmless: the fence turned on, the
-parachute made ready or not. Source: ArduPilot 4.7 AC_Fence, AP_Parachute."""
+parachute made ready or not, the switch of camera, sprayer, gripper, mount or relay. Source:
+ArduPilot 4.7 AC_Fence, AP_Parachute; its documentation, "Auxiliary functions"."""
 
 _ENTRANCES = (Command.NAV_WAYPOINT, Command.NAV_LOITER_TO_ALT)  # What an approach may start from.
 
@@ -80,8 +82,11 @@ def _ardupilot_takeoff(context: ValidationContext) -> Hits:
         yield hit("ardupilot-takeoff-first", takeoffs[0], before=before)
     for k, item in context.each(Command.DO_SET_HOME):
         same_height = item.params[0] == 0 and abs(context.height(item)) < threshold.home_moved
-        if not same_height and (context.airborne or min(takeoffs, default=k) < k):
+        counts = not same_height and (context.airborne or min(takeoffs, default=k) < k)
+        if counts:
             yield hit("ardupilot-set-home", k)
+        if counts or _left_out(context, item):
+            yield hit("px4-set-home", k)
 
 
 @checks
@@ -134,7 +139,7 @@ def _alone(context: ValidationContext) -> Hits:
 
 
 def _left_out(context: ValidationContext, item: MissionItem) -> str:
-    """Return what ArduPilot does at `item` that is neither predicted nor checked, "" if nothing."""
+    """Return what is done at `item` that is neither predicted nor checked, "" for nothing."""
     how, frame = item.params[0], context.frame
     if item.command == Command.NAV_DELAY and not how > 0 and item.params[1:] != (-1, -1, -1):
         return "waits for a time of the day (UTC)"
