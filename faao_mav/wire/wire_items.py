@@ -6,7 +6,7 @@ are one less on the wire.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -188,34 +188,23 @@ def compare(
     if len(sent) != len(found):
         given, there = (len(items[home:]) for items in (sent, found))
         differences.append(Difference(part, None, "count", given, there, "wrong"))
-    for index, (one, other) in enumerate(zip(sent[home:], found[home:], strict=False)):
-        differences += _compare(mission_item(one), mission_item(other), index, part, vehicle)
-    return tuple(differences)
-
-
-def _compare(
-    sent: MissionItem,
-    found: MissionItem,
-    index: int,
-    part: MissionType,
-    vehicle: VehicleType | None,
-) -> Iterator[Difference]:
     flown = part is MissionType.MISSION
-    known = not flown or vehicle is None or vehicle.dialect.is_known(sent.command)
-    stored = sent if vehicle is None else vehicle.dialect.stored(sent)
-    values = [
-        (each.command, each.frame, each.autocontinue, *each.numbers)
-        for each in (sent, found, stored)
-    ]
-    for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
-        unset = math.isnan(was) and is_ == 0
-        idle = field == "autocontinue" and not flown
-        lost = _same(field, kept, is_, found.frame)
-        if unset or idle or _same(field, was, is_, sent.frame) or (lost and field == "frame"):
-            continue
-        # What is not known to be kept may be lost, but not replaced.
-        lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
-        yield Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
+    for index, rows in enumerate(zip(sent[home:], found[home:], strict=False)):
+        item, read = map(mission_item, rows)
+        known = not flown or vehicle is None or vehicle.dialect.is_known(item.command)
+        stored = item if vehicle is None else vehicle.dialect.stored(item)
+        values = [(x.command, x.frame, x.autocontinue, *x.numbers) for x in (item, read, stored)]
+        for field, was, is_, kept in zip(_FIELDS, *values, strict=True):
+            unset = math.isnan(was) and is_ == 0
+            idle = field == "autocontinue" and not flown
+            lost = _same(field, kept, is_, read.frame)
+            if unset or idle or _same(field, was, is_, item.frame) or (lost and field == "frame"):
+                continue
+            # What is not known to be kept may be lost, but not replaced.
+            lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
+            told = Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
+            differences.append(told)
+    return tuple(differences)
 
 
 def _same(field: str, one: float, other: float, frame: int) -> bool:

@@ -258,8 +258,7 @@ def test_at_its_fence_it_does_what_its_parameters_say(
     assert max(north) == pytest.approx(farthest, abs=3)
     assert (north[-1], flown[-1].relative_alt / 1000) == pytest.approx(end, abs=3)
     assert desk.machine.armed == (end[1] > 0)
-    current = only(desk.sent, messages.MissionCurrent)  # disarmed it would begin anew
-    assert (current[-1].seq > 0) == desk.machine.armed
+    assert (only(desk.sent, messages.MissionCurrent)[-1].seq > 0) == desk.machine.armed
     changes = [beat.custom_mode for beat in only(desk.sent, messages.Heartbeat)]
     assert [m for m, before in zip(changes, [None, *changes], strict=False) if m != before] == modes
     told = kind == "px4" or bool(parameters)
