@@ -96,14 +96,15 @@ def direct(
         for name, flight in improved.items():
             if (value := search.value(flight)) > begun[name]:
                 flights[name], reached[name] = flight, value
-    going = [search.best(reached, flights)]
+    equal = (search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
+    going = list(dict.fromkeys(equal))
     if problem.mapped:
         going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]
     tell(2, "the best start", reached[going[0]])
     warm = several or (rough and alone and problem.kinematics.min_speed == 0)
     optima = {name: search.followed(flights[name], warm=warm) for name in going}
-    ends = {name: search.value(each.trajectory) for name, each in optima.items()}
-    best = max(optima.values(), key=lambda each: each.value)
+    ends = {name: each.trajectory for name, each in optima.items()}
+    best = optima[search.best({name: each.value for name, each in optima.items()}, ends)]
     if isinstance(own_steps, RateSteps) and not rough:
         best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
     if any(problem.plan.radio.spreads) and not rough:
@@ -122,7 +123,7 @@ def direct(
     found = solution.maximised
     # values by tables may be above those of the precoders, and without shadowing more is delivered
     history = np.maximum.accumulate([next(iter(begun.values())), *reached.values()])
-    reached |= ends
+    reached |= {name: search.value(flight) for name, flight in ends.items()}
     return replace(
         solution,
         history=np.append(np.minimum(history, found), found),
@@ -229,12 +230,17 @@ class _Search:
         tolerance = _ROUGHLY if self.rough else problem.plan.optimizer.tolerance
         return problem.improved(field, start, tolerance, steps, warm=warm)
 
-    def best(self, values: Mapping[str, float], flights: Mapping[str, Trajectory]) -> str:
-        """Return which of the `flights` with values within `ROUGH` of the best delivers most.
+    def best(
+        self,
+        values: Mapping[str, float],
+        flights: Mapping[str, Trajectory],
+        within: float = _EQUAL,
+    ) -> str:
+        """Return which of the `flights` with values `within` the best one's delivers most.
 
         A route and its mirror image have the same R_avg, and may deliver very different amounts.
         """
-        most = max(values.values()) - ROUGH
+        most = max(values.values()) - within
 
         def delivered(name: str) -> float:
             rates = self.field.value(flights[name].w.T)
