@@ -9,6 +9,7 @@ of seven digits, in base64.
 import base64
 import io
 import math
+import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -56,9 +57,9 @@ _SAME = 6
 _MAX_RASTER = 400_000_000
 """Bytes of the largest raster that is read. Chosen."""
 
-_DRIVERS = {".hgt": "SRTMHGT", ".tif": "GTiff", ".tiff": "GTiff"}
-"""GDAL's readers: that of a tile of heights by 3 or 1 seconds of arc knows its place by its name,
-which begins with its south-west corner, as N47E008."""
+_TILE = re.compile(r"[NS][0-9]{2}[EW][0-9]{3}", re.IGNORECASE)
+"""How the name of a tile of heights begins: its south-west corner, degrees. GDAL would read others
+than such numbers as 0."""
 
 
 def read_map(path: str | Path) -> GainMap:
@@ -199,11 +200,12 @@ class Raster:
     """`values` (m, k), NaN where they are not known, of cells over the ground.
 
     `matrix` (3, 3) tells coordinates from column, row and 1, and `from_degrees` from longitude and
-    latitude.
+    latitude; `inverse` is that of the matrix.
     """
 
     values: Real
     matrix: Real
+    inverse: Real
     from_degrees: "Transformer"
 
     def place(self, row: Real, column: Real) -> tuple[Real, Real]:
@@ -226,7 +228,7 @@ class Raster:
         from scipy.ndimage import map_coordinates
 
         x, y = self.from_degrees.transform(longitude, latitude)
-        column, row, _ = np.tensordot(np.linalg.inv(self.matrix), [x, y, np.ones_like(x)], 1) - 0.5
+        column, row, _ = np.tensordot(self.inverse, [x, y, np.ones_like(x)], 1) - 0.5
         rows, columns = self.values.shape
         on = (np.abs(2 * row - rows + 1) <= rows) & (np.abs(2 * column - columns + 1) <= columns)
         at = np.where(on, row, 0.0), np.where(on, column, 0.0)
@@ -255,7 +257,8 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
     Raises `InputError` for anything else; `what` says what was expected.
     """
     content, path = read_bytes(path, _MAX_RASTER, what), Path(path)
-    driver = _DRIVERS[path.suffix.lower()]
+    driver = "SRTMHGT" if path.suffix.lower() == ".hgt" else "GTiff"
+    corner = _TILE.match(path.name)
     check_extra("maps", "rasterio", f"{path}, a raster,")
     import rasterio
     from pyproj import CRS, Transformer
@@ -263,7 +266,7 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
     try:
         with (
             warnings.catch_warnings(action="ignore"),  # of rasters without a place: told below
-            rasterio.MemoryFile(content, filename=path.name[:7] + path.suffix) as file,
+            rasterio.MemoryFile(content, filename=f"{corner[0] if corner else ''}.hgt") as file,
             file.open(driver=driver) as data,
         ):
             if data.count != 1 or not data.crs or data.width * data.height > most:
@@ -274,10 +277,11 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
                 )
             values = data.read(1, masked=True).astype(np.float64).filled(np.nan)
             crs, matrix = CRS.from_wkt(data.crs.to_wkt()), np.reshape([*data.transform], (3, 3))
+            inverse = np.linalg.inv(matrix)
             from_degrees = Transformer.from_crs("EPSG:4326", crs, always_xy=True)
     except InputError:
         raise
     except Exception as error:  # rasterio and GDAL raise several kinds
         raise InputError(f"{path}: cannot be read as {what}") from error
 
-    return Raster(values, matrix, from_degrees)
+    return Raster(values, matrix, inverse, from_degrees)

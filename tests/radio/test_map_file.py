@@ -186,3 +186,8 @@ def test_a_geotiff_of_any_projection_becomes_a_local_grid(tmp_path: Path) -> Non
         file.write(np.zeros((2, 8, 9)))
     with pytest.raises(InputError, match=r"a\.tif: 2 bands, 9 x 8 cells, no coordinates; expected"):
         read_map(path)
+    told |= {"count": 1, "crs": crs, "transform": rasterio.Affine(9, 0, 424e3, 0, 0, 5207e3)}
+    with rasterio.open(path, "w", driver="GTiff", width=9, height=8, **told):
+        pass  # its rows are all in one place
+    with pytest.raises(InputError, match=r"a\.tif: cannot be read as a map"):
+        read_map(path)

@@ -154,7 +154,8 @@ def test_heights_that_are_not_known_are_the_nearest_and_others_refused(tmp_path:
         terrain_map([raster], STATION, 2.4e9, (60.0,), 0.0, 1000.0, 1.0)
     for name, content, told in (
         ("N47E008.hgt", b"\0" * 99, "cannot be read as heights"),
-        ("ridge.hgt", bytes(2 * 1201**2), "named as N47E008"),
+        ("northwest.hgt", bytes(2 * 1201**2), "named as N47E008"),
+        ("ridge.asc", b"ncols 9", "cannot be read as heights"),
         ("S01W001.hgt", b"\x80\0" * 1201**2, "no heights of -500 to 9000 m"),
     ):
         (tmp_path / name).write_bytes(content)
