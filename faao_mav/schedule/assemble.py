@@ -193,12 +193,14 @@ def check_run_in(plan: Plan, route: Route) -> None:
 
 def _corners(plan: Plan, start: Real, end: Real, name: str) -> Real:
     fence, margin = plan.keep_in, plan.margin
-    if fence is not None and not _kept(fence, margin).covers(np.zeros((1, 2))).all():
+    if fence is None:
+        return np.empty((0, 2))
+    if not _kept(fence, margin).covers(np.zeros((1, 2))).all():
         raise InputError(
             f"{plan.source}: site.origin: home, where the mission takes off, is "
             f"{trouble(plan, (0.0, 0.0))}"
         )
-    way = way_between(plan, start, end)
+    way = _way(fence, margin, start, end)
     if way is None:
         raise InfeasibleError(
             f"{edge_of(plan)}: no way leads from {name} that keeps {margin:g} m "

@@ -188,6 +188,8 @@ def test_a_way_that_is_not_needed_is_not_there() -> None:
     landing = walled(**{"mission.on_finish": "land"})
     assert len(way_home(landing, np.array([300.0, 60.0]))) == 0
     assert len(way_out(landing, np.array([0.0, 60.0]))) == 2
+    with pytest.raises(InfeasibleError, match=r"from flight\.end to home .* that keeps 4 m"):
+        way_home(aside, np.array([150.0, 222.0]))  # 2 m from the zone
 
 
 spots = st.tuples(st.integers(-150, 450), st.integers(-150, 250))
