@@ -59,6 +59,8 @@ def distances_to_segment(points: Real, begin: Real, end: Real) -> Real:
 def distances_to_path(points: Real, path: Real) -> Real:
     """Return the distance of each of `points` (n, 2) from the polyline `path` (m, 2), (n,).
 
+    Points that are not finite are infinitely far.
+
     >>> distances_to_path(np.array([[1.0, 2.0], [7.0, 4.0]]), np.array([[0.0, 0.0], [4.0, 0.0]]))
     array([2., 5.])
     """
@@ -67,7 +69,9 @@ def distances_to_path(points: Real, path: Real) -> Real:
     ends = np.vstack([path, path[-1:]])  # of one leg at least
     each = np.asarray(shapely.linestrings(np.stack([ends[:-1], ends[1:]], axis=1)))
     with np.errstate(divide="ignore", invalid="ignore"):  # the length of a leg may underflow
-        near = shapely.STRtree(each).query_nearest(
+        (found, _), distances = shapely.STRtree(each).query_nearest(
             shapely.points(points), return_distance=True, all_matches=False
         )
-    return np.asarray(near[1])
+    result = np.full(len(points), np.inf)
+    result[found] = distances
+    return result

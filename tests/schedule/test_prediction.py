@@ -176,6 +176,7 @@ def test_the_distance_to_a_path_is_the_least_to_a_leg(points: np.ndarray, path: 
     legs = list(zip(path, [*path[1:], path[-1]], strict=True))
     expected = np.min([distances_to_segment(points, a, b) for a, b in legs], axis=0)
     assert distances_to_path(points, path) == pytest.approx(expected, abs=1e-6)
+    assert distances_to_path(np.full((1, 2), np.nan), path) == np.inf
 
 
 def test_the_way_before_the_plan_begins_does_not_count() -> None:
