@@ -167,3 +167,7 @@ def test_one_precoder_for_many_draws(modulation: str, W: float) -> None:
     assert np.mean(rate) > np.mean(known)
     # but not the precoders of somebody who knows the fading
     assert np.all(rate <= np.mean(best(draws, W, modulation)[1], axis=1))
+    # nor is one for two draws 60 dB apart below that of the weaker
+    draws = np.array([[[[1e3, 1e3]], [[1.0, -1.0j]]]])
+    weaker = best_precoders(draws[:, 1:], W, modulation, 1.0)[:, None]
+    assert mean(best_precoders(draws, W, modulation, 1.0)[:, None]) > mean(weaker) - 0.01
