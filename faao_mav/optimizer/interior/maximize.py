@@ -143,10 +143,13 @@ def nearest_flight(
     path: Real,
     start: Trajectory,
     constraints: Sequence[Constraint] = (),
+    *,
+    first: bool = False,
 ) -> Trajectory | None:
     """Return the flight nearest to `path` (n, 2) m that keeps the limits of `kin`.
 
-    None where none is found that keeps `constraints` too. `start` is any flight of `kin`.
+    None where none is found that keeps `constraints` too. `start` is any flight of `kin`. With
+    `first` the way there ends with a flight that keeps them.
     """
 
     def closeness(w: Real) -> StageValues:
@@ -161,7 +164,10 @@ def nearest_flight(
         if goal.flat:
             continue
         search = Search(kin, every, goal, unknowns(kin, start), tolerance=_TOLERANCE, mu=COLD)
-        with np.errstate(all="ignore"):
-            search.run(_MOST_STEPS)
-        start = kin.follow(search.v.T * kin.max_speed)
+        for most in range(1, _MOST_STEPS + 1) if first else (_MOST_STEPS,):
+            with np.errstate(all="ignore"):
+                converged = search.run(most)
+            start = kin.follow(search.v.T * kin.max_speed)
+            if converged or (first and every_excess(kin, every, start) <= ALLOWED):
+                break
     return start if every_excess(kin, (*limits, *constraints), start) <= ALLOWED else None

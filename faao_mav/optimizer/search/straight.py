@@ -216,7 +216,7 @@ def _first_flight(kin: Kinematics, curves: Iterator[Real]) -> Trajectory | None:
         near.append((every_excess(kin, constraints_of(kin), flight), len(near), flight))
     for _, _, flight in sorted(near)[:_REPAIRS]:
         drawn_in = (1 - _DRAWN_IN) * flight.w + _DRAWN_IN * flight.w.mean(axis=0)
-        repaired = nearest_flight(kin, drawn_in, flight)
+        repaired = nearest_flight(kin, drawn_in, flight, first=True)
         if repaired is not None:
             return repaired
     return None
