@@ -176,9 +176,9 @@ def _stations(plan: PlanContents) -> Iterator[Problem]:
     lasts, farthest = plan.flight.duration, MAX_LOCAL_DISTANCE / 1000
     for name, station in zip(STATIONS, plan.radio.stations, strict=True):
         given, track = quote(list(station.velocity)), station.track
-        away = float(np.abs(station.at(np.array([lasts]))).max()) / 1000
         if math.hypot(*station.velocity) > FASTEST:
             yield wrong("station-fast", name=name, given=given, fastest=FASTEST)
+        away = float(np.abs(station.at(np.array([lasts]))).max()) / 1000
         if track is not None and any(station.velocity):
             yield wrong("track-velocity", name=name, given=given)
         if track is not None and track.times[-1] < lasts:

@@ -195,7 +195,7 @@ def frontier_cases(plan: Plan, frontier: str, points: int, **grid: Any) -> tuple
         case _:
             accepted = "duration,data or power,data or energy,data"
             raise InputError(f"--frontier {quote(frontier)}: expected {accepted}")
-    check_varied((key, *grid["vary"]))
+    check_varied((*along[0], *grid["vary"]))
     data = load_yaml(plan.text, plan.source) | {"goal": {}}
     return tuple(
         replace(case, values=((key, next(iter(changes.values()))), *case.values))

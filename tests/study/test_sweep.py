@@ -142,6 +142,8 @@ def test_the_points_of_a_frontier_end_at_the_plan() -> None:
     assert [case.scheme for case in cases] == ["faao", "mrt"] * 6
     own = ("radio.base_station.power_dbm", -10.0)
     assert cases[2].values == (own, ("radio.modulation", "qpsk"))
+    with pytest.raises(InputError, match="sets the same"):
+        frontier_cases(plan, "power,data", 3, vary={"radio.relay.power_dbm": (1,)})
 
 
 def test_other_trade_offs_are_refused() -> None:
