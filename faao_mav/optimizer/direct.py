@@ -14,6 +14,7 @@ starts, and several times quicker.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -193,14 +194,21 @@ class _Search:
         stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
         one = alone or self.rough or problem.mapped
         names = ("straight",) if one else problem.plan.optimizer.starts
+        again = None if known is None else self._in_time(known)
+        if alone and again is not None:
+            near = kin.follow(again)
+            if every_excess(kin, problem.limits(kin), near) <= ALLOWED:
+                return {"known": near}
         if problem.mapped and not alone:
             routes = starts_over_map(problem, self.field, rough=self.rough)
         if not routes:
             routes = starts(kin, names, stations, problem.free_area, fenced)
+        if self.rough:
+            routes = dict(islice(routes.items(), 1))
         if before is not None:
             routes["cutoff"] = before.trajectory
-        if known is not None:
-            near = feasible(kin, next(iter(routes.values())), self._in_time(known), fenced)
+        if again is not None:
+            near = feasible(kin, next(iter(routes.values())), again, fenced)
             routes = {"known": near} if alone else routes | {"known": near}
         if problem.energy < np.inf:
             routes = sparing_starts(kin, routes, problem.limits(kin))

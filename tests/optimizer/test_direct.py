@@ -180,6 +180,7 @@ def test_a_rough_flight_keeps_its_limits_and_comes_near_the_finished_one() -> No
         if asked.keep_in is not None:
             assert asked.keep_in.clearance(flight.w) >= 1 - 1e-6
         assert 0.9 * finished < flight.delivered_rate < finished + 1e-3
+        assert list(flight.starts) == ["straight" if near is None else "known"]
 
 
 def test_plans_with_other_stations_share_their_tables(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ less and less of them. What counts is always the map as it is.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -137,10 +138,13 @@ class QueueSweep:
 def starts_over_map(
     problem: Problem, field: RateField, *, rough: bool = False
 ) -> dict[str, Trajectory]:
-    """Return the best flights along paths over so many cells: `map`, `map 2` and on."""
+    """Return the best flights along paths over so many cells: `map`, `map 2` and on.
+
+    A `rough` one is the first that is found.
+    """
     found: dict[str, Trajectory] = {}
     for count in (_ROUGH_CELLS,) if rough else CELLS:
-        flights = [*flights_over_map(problem, field, count)]
+        flights = [*islice(flights_over_map(problem, field, count), 1 if rough else None)]
         if flights:
             best = max(flights, key=lambda flight: _worth(problem, field, flight))
             found[f"map {len(found) + 1}" if found else "map"] = best
