@@ -119,7 +119,14 @@ def direct(
     if not best.converged:
         ending = f"stopped after {best.iterations} steps, {ending}"
     solution = make_solution(
-        problem, flight, precoders, [], converged=best.converged, ending=ending
+        problem,
+        flight,
+        precoders,
+        [],
+        converged=best.converged,
+        ending=ending,
+        # the sums of the mutual information take longer than all else of a rough flight
+        rates=search.field.value(flight.w.T) if rough and not counts_cutoff else None,
     )
     found = solution.maximised
     # values by tables may be above those of the precoders, and without shadowing more is delivered

@@ -278,9 +278,10 @@ def make_solution(
     *,
     converged: bool,
     ending: str,
+    rates: Real | None = None,
 ) -> Solution:
-    """Put an iterate together with its fading and rates."""
-    I_U, I_G = problem.rates(flight.w, precoders)
+    """Put an iterate together with its fading and rates: those given (2, n), or computed."""
+    I_U, I_G = problem.rates(flight.w, precoders) if rates is None else rates
     return Solution(
         problem=problem,
         t=problem.kinematics.time_step * np.arange(len(flight.w), dtype=np.float64),
