@@ -181,9 +181,9 @@ class _Search:
         return self.problem.plan.optimizer.max_iterations * _LONG_SEARCH
 
     def value(self, flight: Trajectory) -> float:
-        """Return what is reported: by the alphabet or the steps, not what smooths them."""
+        """Return what is reported: by the alphabet or the steps; if rough, by the tables."""
         problem = self.problem
-        if not self.scheme.gaussian and problem.uav_user.steps is None:
+        if self.rough or (not self.scheme.gaussian and problem.uav_user.steps is None):
             return problem.value(self.field.value(flight.w.T))
         precoders = [self.scheme.precoders(link, link.channel(flight.w)) for link in problem.links]
         return problem.value(problem.rates(flight.w, precoders))
