@@ -33,8 +33,7 @@ class Behaviour:
     no_mode: int  # The MAV_RESULT for no such mode
     denied: int  # That of a mode that it does not enter, and with which it does not arm
     returns_by_mode: frozenset[str]  # The types whose mode changes when a mission has them return
-    keeps_item: frozenset[str] = frozenset()  # Those that keep the item, disarmed on the mission
-    leaves_mode: bool = False  # Disarmed in a mode not to arm in, it is in the last one asked for
+    rewinds: frozenset[str] = frozenset()  # Those whose mission begins anew once they are disarmed
     # What ground stations look for beside the parameters that the package knows
     parameters: Mapping[str, float] = field(default_factory=dict)
     numbers_missions: bool = False  # It tells a number for each mission
@@ -98,7 +97,7 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
         no_mode=2,  # denied
         denied=4,  # failed
         returns_by_mode=frozenset({"plane"}),
-        keeps_item=frozenset({"plane"}),
+        rewinds=frozenset({"copter"}),  # AP_Arming_Copter::disarm; a plane in AUTO does not
         parameters={"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4},
         tells_no_place=True,
         armed_inside_only=True,
@@ -111,7 +110,6 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
         no_mode=0,  # accepted, but nothing changes
         denied=1,  # temporarily rejected
         returns_by_mode=frozenset({"copter", "plane"}),
-        leaves_mode=True,
         numbers_missions=True,
         silent_at_boot=True,
         infeasible=_px4_infeasible,

@@ -1,7 +1,7 @@
 """The mock autopilot: a vehicle without sockets or clock."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -185,7 +185,8 @@ class MockAutopilot(Machine[None]):
                 flight.mode = flight.modes.at_fence.get("return", flight.mode)
             out.append(self._mission_current())
         if flight.aircraft.landed(clock):
-            self._disarm(flight.land)
+            flight.land()
+            self._rewind()
             out.append(Statustext(MavSeverity.INFO, "Landed, disarming"))
         if (flight.mode, flight.armed) != (before, True):
             out.append(self._heartbeat())
@@ -291,7 +292,8 @@ class MockAutopilot(Machine[None]):
 
     def _arm(self, wanted: bool) -> int:
         if not wanted:
-            self._disarm(self.flight.stop)
+            self.flight.stop()
+            self._rewind()
             return _ACCEPTED
         if self._why_not_armed():
             return self.behaviour.denied
@@ -299,14 +301,10 @@ class MockAutopilot(Machine[None]):
             self.flight.arm(self._clock)
         return self._begin() if self.mode == self.flight.modes.mission else _ACCEPTED
 
-    def _disarm(self, turn_off: Callable[[], None]) -> None:
-        """Turn the motors off; the mission begins anew, mostly, when they are on again."""
-        flight, kept = self.flight, self.vehicle.kind in self.behaviour.keeps_item
-        turn_off()
-        if not (kept and flight.mode == flight.modes.mission):
+    def _rewind(self) -> None:
+        """Go back to the first item, disarmed, as some types do."""
+        if self.vehicle.kind in self.behaviour.rewinds:
             self._current = 0
-        if self.behaviour.leaves_mode and flight.mode in flight.modes.not_to_arm_in:
-            flight.mode = flight.asked_mode
 
     def _why_not_armed(self) -> str:
         """Return what it says when it does not arm, "" if it does."""
