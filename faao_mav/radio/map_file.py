@@ -199,18 +199,17 @@ def _table(path: str | Path) -> dict[str, Real]:
 class Raster:
     """`values` (m, k), NaN where they are not known, of cells over the ground.
 
-    `matrix` (3, 3) tells coordinates from column, row and 1, and `from_degrees` from longitude and
-    latitude; `inverse` is that of the matrix.
+    `from_degrees` tells coordinates from longitude and latitude, and `to_cell` (3, 3) column, row
+    and 1 from coordinates and 1.
     """
 
     values: Real
-    matrix: Real
-    inverse: Real
+    to_cell: Real
     from_degrees: "Transformer"
 
     def place(self, row: Real, column: Real) -> tuple[Real, Real]:
         """Return latitudes and longitudes (...), degrees, from the middle of the first cell on."""
-        x, y, _ = np.tensordot(self.matrix, [column + 0.5, row + 0.5, np.ones_like(row)], 1)
+        x, y, _ = np.linalg.solve(self.to_cell, [column + 0.5, row + 0.5, np.ones_like(row)])
         longitude, latitude = self.from_degrees.transform(x, y, direction="INVERSE")
         return latitude, longitude
 
@@ -228,7 +227,7 @@ class Raster:
         from scipy.ndimage import map_coordinates
 
         x, y = self.from_degrees.transform(longitude, latitude)
-        column, row, _ = np.tensordot(self.inverse, [x, y, np.ones_like(x)], 1) - 0.5
+        column, row, _ = np.tensordot(self.to_cell, [x, y, np.ones_like(x)], 1) - 0.5
         rows, columns = self.values.shape
         on = (np.abs(2 * row - rows + 1) <= rows) & (np.abs(2 * column - columns + 1) <= columns)
         at = np.where(on, row, 0.0), np.where(on, column, 0.0)
@@ -276,12 +275,12 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
                     "cells, coordinates"
                 )
             values = data.read(1, masked=True).astype(np.float64).filled(np.nan)
-            crs, matrix = CRS.from_wkt(data.crs.to_wkt()), np.reshape([*data.transform], (3, 3))
-            inverse = np.linalg.inv(matrix)
+            to_cell = np.linalg.inv(np.reshape([*data.transform], (3, 3)))
+            crs = CRS.from_wkt(data.crs.to_wkt())
             from_degrees = Transformer.from_crs("EPSG:4326", crs, always_xy=True)
     except InputError:
         raise
     except Exception as error:  # rasterio and GDAL raise several kinds
         raise InputError(f"{path}: cannot be read as {what}") from error
 
-    return Raster(values, matrix, inverse, from_degrees)
+    return Raster(values, to_cell, from_degrees)
