@@ -97,19 +97,21 @@ def direct(
         for name, flight in improved.items():
             if (value := search.value(flight)) > begun[name]:
                 flights[name], reached[name] = flight, value
-    equal = (search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
-    going = list(dict.fromkeys(equal))
     if problem.mapped:
         going = sorted(reached, key=reached.__getitem__, reverse=True)[:_FOLLOWED]
+    else:
+        equal = (search.best(reached, flights, within) for within in (_EQUAL, ROUGH))
+        going = list(dict.fromkeys(equal))
     tell(2, "the best start", reached[going[0]])
     warm = several or (rough and alone and problem.kinematics.min_speed == 0)
     optima = {name: search.followed(flights[name], warm=warm) for name in going}
     ends = {name: each.trajectory for name, each in optima.items()}
     best = optima[search.best({name: each.value for name, each in optima.items()}, ends)]
-    if isinstance(own_steps, RateSteps) and not rough:
-        best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
-    if any(problem.plan.radio.spreads) and not rough:
-        best = search.under_shadowing(best)
+    if not rough:
+        if isinstance(own_steps, RateSteps):
+            best = search.sharpened([*optima.values(), replace(best, trajectory=flights[going[0]])])
+        if any(problem.plan.radio.spreads):
+            best = search.under_shadowing(best)
     flight = best.trajectory
     precoders = [
         search.precoders(link, rate, flight.w)
