@@ -6,8 +6,8 @@ Source: OGC KML 2.3 (07-147r2).
 import math
 import re
 from collections.abc import Iterator
+from html import escape
 from typing import TypeAlias
-from xml.sax.saxutils import escape
 
 import numpy as np
 import shapely
