@@ -76,6 +76,7 @@ def test_what_is_no_result_is_refused(
         ("H_rB", np.ones((4, 20, 2, 2)), r"H_rB: float64 \(4, 20, 2, 2\)"),
         ("w", np.zeros((20, 2), dtype=complex), "w: complex128"),
         ("w", np.full((20, 2), np.nan), "w: expected finite numbers"),
+        ("P_B", np.full((20, 2, 2), 1e200), "P_B: expected finite numbers below 1e\\+100"),
         ("t", np.zeros(20), "t: expected the times of the slots"),
         ("P_B", np.ones((20, 1, 2)), r"P_B: float64 \(20, 1, 2\); expected numbers \(20, 2, 2\)"),
     ):
