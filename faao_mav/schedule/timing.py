@@ -54,10 +54,11 @@ class Retimed:
     t: it grows with the way that is flown. What is `known` of the vehicle tells T_k; without that
     it is c_k (v_k / v'_k - 1), c_k being how long the leg takes at its command. A command that is
     not reached, as on a short leg, counts as the greatest speed of the leg:
-    `limits` (m - 1,), m/s, infinite where it is reached.
+    `limits` (m - 1,), m/s, infinite where it is reached. An aircraft that is `slow` to change its
+    speed comes to it legs behind: its commands have no limit.
     """
 
-    def __init__(self, schedule: Schedule, known: LegDurations | None) -> None:
+    def __init__(self, schedule: Schedule, known: LegDurations | None, *, slow: bool) -> None:
         route, flown = schedule.route, schedule.flown
         self._waits, self._lead, self._known = route.waits, route.lead, known
         self._t, self._places = flown.t[::_STRIDE], flown.position[::_STRIDE, :2]
@@ -75,7 +76,7 @@ class Retimed:
         peaks = np.full(len(route.speeds), SLOWEST)
         np.maximum.at(peaks, leg, speed * under_way)
         tops = route.speeds if known is None else known.flown(route.speeds)[0]
-        self._peaks = np.where(tops > _REACHED * peaks, peaks, np.inf)
+        self._peaks = np.where(slow | (tops <= _REACHED * peaks), np.inf, peaks)
         self.limits = self._peaks if known is None else np.minimum(self._peaks, known.most)
         self._speeds = np.minimum(tops, self._peaks)
         share = np.clip(speed / self._speeds[leg], 1e-9, 1.0) * under_way
