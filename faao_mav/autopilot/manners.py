@@ -42,14 +42,16 @@ class Modes:
 
     `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
     (a plane circles there) without sticks, `guided` flies by setpoints (None: streams are not flown
-    by that type). `at_fence` are those that hold, return and land, as after a breach of the fence.
-    In the modes `not_to_arm_in` the autopilot does not arm, or takes off as soon as it has.
+    by that type). `at_fence` are those that hold, return and land, as after a breach of the fence;
+    a mission itself changes to those `at_end` at its last item. In the modes `not_to_arm_in` the
+    autopilot does not arm, or takes off as soon as it has.
     """
 
     rest: int
     mission: int
     hold: int
     at_fence: Mapping[FenceAction, int] = field(default_factory=dict)
+    at_end: frozenset[int] = frozenset()
     guided: int | None = None
     not_to_arm_in: frozenset[int] = frozenset()
 

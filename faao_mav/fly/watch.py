@@ -224,12 +224,13 @@ class Watch(Machine[Ending]):
             self._order = None
             self.seen.told.append("it holds; interrupt again to leave it")
 
-    def _on_another_mode(self, mode: int, now: float) -> None:  # noqa: ARG002
-        """Step aside for who set that; the last item has a mode of its own, as PX4's return."""
-        if self.phase == "flying" and self._furthest >= self._last:
+    def _on_another_mode(self, mode: int, now: float) -> None:
+        """Step aside for who set that; a last item may have a mode of its own, as PX4's return."""
+        may_end = self.phase == "flying" and mode in self._modes.at_end
+        if may_end and self._furthest >= self._last:
             self._over()
         else:
-            self._aside_since = now if self.phase == "flying" else -math.inf
+            self._aside_since = now if may_end else -math.inf
             self._step_aside()
 
     def _answered(self, order: Order, result: int, now: float) -> None:

@@ -32,7 +32,6 @@ class Behaviour:
     requested_mode: Callable[[int, int], int | None]
     no_mode: int  # The MAV_RESULT for no such mode
     denied: int  # That of a mode that it does not enter, and with which it does not arm
-    returns_by_mode: frozenset[str]  # The types whose mode changes when a mission has them return
     rewinds: frozenset[str] = frozenset()  # Those whose mission begins anew once they are disarmed
     # What ground stations look for beside the parameters that the package knows
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -96,7 +95,6 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
         requested_mode=lambda mode, _: mode if mode >= 0 else None,
         no_mode=2,  # denied
         denied=4,  # failed
-        returns_by_mode=frozenset({"plane"}),
         rewinds=frozenset({"copter"}),  # AP_Arming_Copter::disarm; a plane in AUTO does not
         parameters={"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4},
         tells_no_place=True,
@@ -109,7 +107,6 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
         requested_mode=lambda main, sub: px4_mode(main, sub) or None,
         no_mode=0,  # accepted, but nothing changes
         denied=1,  # temporarily rejected
-        returns_by_mode=frozenset({"copter", "plane"}),
         numbers_missions=True,
         silent_at_boot=True,
         infeasible=_px4_infeasible,

@@ -181,8 +181,9 @@ class MockAutopilot(Machine[None]):
             self._current = current
             rows = self.lists.items(MissionType.MISSION)[current : current + 1]
             returns = [row for row in rows if row.command == Command.NAV_RETURN_TO_LAUNCH]
-            if returns and self.vehicle.kind in self.behaviour.returns_by_mode:
-                flight.mode = flight.modes.at_fence.get("return", flight.mode)
+            mode = flight.modes.at_fence["return"]
+            if returns and mode in flight.modes.at_end:
+                flight.mode = mode
             out.append(self._mission_current())
         if flight.aircraft.landed(clock):
             flight.land()

@@ -253,7 +253,7 @@ class _Flight(Flight):
 
 _LOITER, _RTL = 12, 11
 # PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL.
-_MODES = Modes(2, 10, _LOITER, {"return": _RTL}, not_to_arm_in=frozenset({_RTL}))
+_MODES = Modes(2, 10, _LOITER, {"return": _RTL}, frozenset({_RTL}), None, frozenset({_RTL}))
 
 ARDUPLANE = ardupilot_type(
     kind="plane",

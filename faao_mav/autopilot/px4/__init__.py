@@ -91,6 +91,7 @@ _MODES = Modes(
     mission=px4_mode(4, 4),
     hold=_HOLD,
     at_fence={"hold": _HOLD, "return": _RETURN, "land": _LAND},
+    at_end=frozenset({_HOLD, _RETURN, _LAND}),
     guided=px4_mode(6, 0),
     not_to_arm_in=frozenset(px4_mode(4, sub) for sub in (2, 5, 6, 9)),
 )
