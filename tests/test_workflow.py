@@ -73,7 +73,7 @@ def test_files_come_together_and_go_when_they_are_no_longer_the_missions(
     assert "m.fence.waypoints" not in names()
 
     # a user's own files are not replaced, nor removed
-    for name, text in (("m.fence.waypoints", "QGC WPL 110\n"), ("m.param", "WPNAV_SPEED,700\n")):
+    for name, text in (("m.param", "# for me\nRALLY,7\n"), ("m.fence.waypoints", "QGC WPL 110\n")):
         own = tmp_path / name
         own.write_text(text)
         with pytest.raises(InputError, match="not of an earlier run"):

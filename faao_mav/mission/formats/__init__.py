@@ -213,8 +213,10 @@ def remove_outdated(beside: Path) -> None:
 
 
 def _is_of_a_run(beside: Path) -> bool:
-    """Tell by the first two lines whether this program wrote `beside` beside a mission."""
+    """Tell by the first two lines, as `comment_for` has it, whether this program wrote `beside`."""
     if not beside.is_file():
         return False
     with beside.open("rb") as file:
-        return any(file.readline(200).startswith(b"# for ") for _ in range(2))
+        lines = [file.readline(300).strip().lower() for _ in range(2)]
+    missions = tuple(map(str.encode, _FORMATS))
+    return any(each.startswith(b"# for ") and each.endswith(missions) for each in lines)
