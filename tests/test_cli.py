@@ -206,7 +206,7 @@ def test_what_a_vehicle_holds_is_downloaded_and_no_other_mission_flown(
     assert read_mission_file(tmp_path / "b.plan").firmware == 12
     end = json.loads(result.stdout.splitlines()[-1])
     assert end["ending"] == "different"
-    assert end["differences"] == ["mission item 1: z: sent 40.0, found 30.0"]
+    assert end["differences"] == ["mission item 2: z: sent 40.0, found 30.0"]
     result = run("debrief", DATA / "logs" / "arducopter.tlog", "--plan", plan)
     assert result.exit_code == 1
     assert "the plan's flight is not in it" in result.output

@@ -210,7 +210,8 @@ def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> s
                 text += f": {rows} rows{with_home}, and a vehicle like this holds about {sure}"
             elif report.item is not None:
                 number = report.item - home
-                text += f", at item {number}" if number >= 0 else ", at the home row"
+                row = number + (part is MissionType.MISSION)
+                text += f", at item {row}" if number >= 0 else ", at the home row"
                 if part is MissionType.MISSION and mission and 0 <= number < len(mission.items):
                     text += f" (command {mission.items[number].command})"
     said = f". The vehicle says: {'; '.join(report.said)}" if report.said else ""

@@ -72,16 +72,18 @@ def wire_items(
         items = (home_item(mission.home), *mission.items)
     else:
         items = tuple(_jump_moved(item, -1) for item in mission.items)
-    first = 0 if mission_type is MissionType.MISSION else None
+    flown = mission_type is MissionType.MISSION
+    first = flown - home_items(vehicle, mission_type)  # the row of a mission's file, in words
     who = "an autopilot unknown here" if vehicle is None else vehicle.family.name
-    for index, item in enumerate(items):
+    for index, item in enumerate(items, first):
         place = {"latitude": item.x, "longitude": item.y, "altitude": item.z}
         unset = " and ".join(name for name, value in place.items() if math.isnan(value))
         if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
             told = f"item {index}: {unset} not set, which {who} would take for 0: give the place"
             raise InputError(told)
     sent = items if vehicle is None else map(vehicle.dialect.sent, items)
-    return tuple(wire_item(item, n, current=n == first) for n, item in enumerate(sent))
+    rows = enumerate(sent, first)
+    return tuple(wire_item(item, n, current=flown and n == first) for n, item in rows)
 
 
 def mission_item(item: WireItem) -> MissionItem:
@@ -100,7 +102,8 @@ def mission_of(
     Raises `InputError` for items that are none: places off the Earth, infinities, half a polygon.
     """
     for mission_type, items in lists.items():
-        for number, item in enumerate(items):
+        first = (mission_type is MissionType.MISSION) - home_items(vehicle, mission_type)
+        for number, item in enumerate(items, first):
             name = f"{mission_type.title} item {number}"
             if item.frame in GLOBAL_FRAMES:
                 check_place((item.x / 1e7, item.y / 1e7), name)
@@ -145,8 +148,8 @@ def wire_item(item: MissionItem, index: int, *, current: bool = False) -> WireIt
 class Difference:
     """One field that was not read back as it was sent.
 
-    `item` is the index in the list of items, home not counted, and None for the list as a whole
-    or the home; `field` is a field of `MissionItem`, `param1` to `param4`, `count` or `home`.
+    `item` is the row in a mission's file, or the index in another list, and None for the list as a
+    whole or the home; `field` is a field of `MissionItem`, `param1` to `param4`, `count` or `home`.
     `kind` is "dropped" when this is what the autopilot's storage is known to lose, "wrong"
     otherwise.
     """
@@ -189,8 +192,8 @@ def compare(
         given, there = (len(items[home:]) for items in (sent, found))
         differences.append(Difference(part, None, "count", given, there, "wrong"))
     flown = part is MissionType.MISSION
-    for index, rows in enumerate(zip(sent[home:], found[home:], strict=False)):
-        item, read = map(mission_item, rows)
+    for row, pair in enumerate(zip(sent[home:], found[home:], strict=False), int(flown)):
+        item, read = map(mission_item, pair)
         known = not flown or vehicle is None or vehicle.dialect.is_known(item.command)
         stored = item if vehicle is None else vehicle.dialect.stored(item)
         values = [(x.command, x.frame, x.autocontinue, *x.numbers) for x in (item, read, stored)]
@@ -202,7 +205,7 @@ def compare(
                 continue
             # What is not known to be kept may be lost, but not replaced.
             lost = lost or (not known and field not in ("frame", "x", "y", "command") and is_ == 0)
-            told = Difference(part, index, field, was, is_, "dropped" if lost else "wrong")
+            told = Difference(part, row, field, was, is_, "dropped" if lost else "wrong")
             differences.append(told)
     return tuple(differences)
 

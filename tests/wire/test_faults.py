@@ -215,7 +215,7 @@ def test_what_a_vehicle_stores_otherwise_is_found_out_and_sent_again() -> None:
     mock.lists.__class__ = Forgetful
     report, _ = upload_to(mock, rows_for("px4", 8))
     assert report.verdict == "different"
-    assert {d.item for d in report.differences} == {5}
+    assert {d.item for d in report.differences} == {6}
 
 
 def test_an_armed_vehicle_gets_no_fence_after_its_mission_and_that_ends_the_upload() -> None:

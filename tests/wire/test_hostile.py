@@ -39,8 +39,8 @@ def test_what_a_vehicle_holds_that_is_no_mission_is_not_downloaded() -> None:
         (MissionType.FENCE, [row(5003, p=NAN)], "fence circle: radius nan"),
         (MissionType.FENCE, [row(5003, p=INF)], "fence item 0: params .inf.*finite numbers"),
         (MissionType.RALLY, [row(5100, y=-(2**31))], r"rally points item 0: .* -214\.7483648"),
-        (MissionType.MISSION, [row(16), row(16, x=2 * 10**9)], r"mission item 1: 200\.0, 149\.16"),
-        (MissionType.MISSION, [row(16, INF)], "mission item 0: .* z inf; expected finite"),
+        (MissionType.MISSION, [row(16), row(16, x=2 * 10**9)], r"mission item 2: 200\.0, 149\.16"),
+        (MissionType.MISSION, [row(16, INF)], "mission item 1: .* z inf; expected finite"),
     ):
         with pytest.raises(InputError, match=told):
             mission_of({part: rows}, vehicle_of("px4"))

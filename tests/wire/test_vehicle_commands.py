@@ -43,12 +43,12 @@ def test_what_is_not_kept_is_told_once_for_each_field(tmp_path: Path) -> None:
         result, data = run(*sent), run(*sent, "--json").stdout
         held = run("download", "--from", to, "--out", out, "--system", 1).stdout
     assert "mission      4 items, 0 fence areas, 0 rally points" in held
-    lost = "mission item 0: param1 2.5 is kept as 2.0 (and so in 3 more items)"
+    lost = "mission item 1: param1 2.5 is kept as 2.0 (and so in 3 more items)"
     assert f"\nnot kept     {lost}\nverified     read back and compared; " in result.stdout
     assert (result.stderr, data.count("\n")) == ("", 1)
     (mission,) = json.loads(data)["lists"]
     assert (mission["list"], mission["items"], mission["verdict"]) == ("mission", 4, "verified")
-    lost_field = {"item": 0, "field": "param1", "sent": 2.5, "found": 2.0, "kind": "dropped"}
+    lost_field = {"item": 1, "field": "param1", "sent": 2.5, "found": 2.0, "kind": "dropped"}
     assert lost_field in mission["differences"]
     assert json.loads(out.read_text())["mission"]["firmwareType"] == 3  # MAV_AUTOPILOT of ArduPilot
     for kept, item in zip(read_mission(out).items, items, strict=True):
@@ -63,7 +63,7 @@ def test_a_refused_upload_is_status_1(tmp_path: Path) -> None:
         (problem,) = put(a_mission(700), to, system=1).problems
     assert result.exit_code == 1
     assert "failed       mission: refused: INVALID_PARAM7" in result.stdout
-    assert "at item 2 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
+    assert "at item 3 (command 16). ArduPilot may now hold old and new items mixed" in result.stdout
     assert "not verified; do not fly it" in result.stderr
     assert "verified     " not in result.stdout
     assert "NO_SPACE: 701 rows with home, and a vehicle like this holds about 650" in problem
