@@ -46,7 +46,7 @@ def upload(
 
     file = cli.read_noted(mission_file)
     values = None if parameters is None else read_parameters(parameters)
-    check_settable(values or (), parameters)
+    check_settable(values or {}, parameters)
     report = send(
         file.mission,
         to,

@@ -90,7 +90,7 @@ def upload(
     """
     if not mission.items:
         raise InputError("upload: the mission has no items")
-    check_settable(parameters or (), "parameters")
+    check_settable(parameters or {}, "parameters")
     with Session(connection, **options) as session:
         found, peer = session.found, session.peer
         if found.armed and not allow_armed:

@@ -131,19 +131,22 @@ def number_in(parameter: Parameter, name: str, given: Mapping[str, float]) -> fl
     return parameter.written(parameter.names[other] * given[other], name)
 
 
-def check_settable(parameters: Iterable[str], source: object) -> None:
-    """Raise `InputError`, which names `source`, for a parameter that is not a mission's own.
+def check_settable(parameters: Mapping[str, float], source: object) -> None:
+    """Raise `InputError`, which names `source`, for one not a mission's own, or a useless value.
 
-    Those are what shapes how some vehicle flies a mission; what decides about failsafes, fence,
+    Its own are what shapes how some vehicle flies a mission; what decides about failsafes, fence,
     return and checks is for its pilot to set.
     """
     tables = (each.parameters.values() for each in vehicle_types())
-    own = {name for table in tables for each in table if each.motion for name in each.names}
+    own = {name: each for table in tables for each in table if each.motion for name in each.names}
     other = [name for name in parameters if name not in own]
     if other:
         told = "not among what a mission is timed for, which alone is set with it"
         do = "set it with the ground station, and give the mission's own file"
         raise InputError(f"{source}: {listed(other)}: {told}; {do}")
+    for name, number in parameters.items():
+        if not own[name].is_usable(number, name):
+            raise InputError(f"{source}: {name}: {number:g}; give {own[name].expected(name)}")
 
 
 def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[Change, ...], str]]:

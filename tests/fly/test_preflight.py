@@ -203,6 +203,7 @@ def test_no_parameters_are_set_but_the_missions_own(mission: Path) -> None:
                 (f"WPNAV_ACCEL,400\n{name},1", 2, f"{name}: not among what a mission is timed for")
                 for name in ("FENCE_ENABLE", "FS_THR_ENABLE", "RTL_ALT", "ARMING_CHECK")
             ),
+            ("WPNAV_SPEED,-5", 2, "WPNAV_SPEED: -5; give a number of at least 10"),
             ("MPC_ACC_HOR,4", 1, "the vehicle has no MPC_ACC_HOR: nothing was set or uploaded"),
         ):
             file.write_text(lines)
