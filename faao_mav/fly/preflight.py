@@ -166,7 +166,7 @@ class Clearance:
             return self.reading.start(now)
         if self.reading.outcome is None:
             return self.reading.tick(now)
-        self.held = self.reading.outcome
+        self.held, self.reading = self.reading.outcome, None  # next time it is read anew
         return None
 
 
