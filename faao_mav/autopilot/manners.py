@@ -42,9 +42,8 @@ class Modes:
 
     `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
     (a plane circles there) without sticks, `guided` flies by setpoints (None: streams are not flown
-    by that type). `at_fence` are those that hold, return and land, as after a breach of the fence;
-    a mission itself changes to those `at_end` at its last item. In the modes `not_to_arm_in` the
-    autopilot does not arm, or takes off as soon as it has.
+    by that type). `at_fence` hold, return and land, as after a breach of the fence, `at_end` are
+    set by a mission's last item. In those `not_to_arm_in` it does not arm, or takes off by itself.
     """
 
     rest: int

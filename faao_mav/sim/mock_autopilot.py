@@ -179,11 +179,10 @@ class MockAutopilot(Machine[None]):
         current = flight.aircraft.at(clock).item + first
         if flight.on_mission and current != self._current:
             self._current = current
-            rows = self.lists.items(MissionType.MISSION)[current : current + 1]
-            returns = [row for row in rows if row.command == Command.NAV_RETURN_TO_LAUNCH]
-            mode = flight.modes.at_fence["return"]
-            if returns and mode in flight.modes.at_end:
-                flight.mode = mode
+            rows, back = self.lists.items(MissionType.MISSION), flight.modes.at_fence["return"]
+            returns = rows[current:] and rows[current].command == Command.NAV_RETURN_TO_LAUNCH
+            if returns and back in flight.modes.at_end:
+                flight.mode = back
             out.append(self._mission_current())
         if flight.aircraft.landed(clock):
             flight.land()

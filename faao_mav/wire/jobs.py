@@ -184,7 +184,7 @@ def read_held(
 def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> str:
     """Return in words why the `report` of a list of `mission` is not verified."""
     home, part, holds = home_items(peer.vehicle, report.part), report.part, ""
-    rows = report.items + home
+    rows, row = report.items + home, (report.item or 0) + (part is MissionType.MISSION) - home
     if report.item is not None and peer.vehicle is not None and not peer.vehicle.dialect.atomic:
         holds = f". {what_is_left(peer)}"
     match report.verdict:
@@ -199,21 +199,19 @@ def explain(report: PartReport, peer: Peer, mission: Mission | None = None) -> s
         case "silent":
             text = "the vehicle stopped answering"
             if report.item is not None:
-                text += f" after it asked for item {report.item} of {rows}"
+                text += f" after it asked for item {row} of {rows}"
         case "cancelled":
             text = "the transfer was cancelled by the vehicle"
         case _:
             text = f"refused: {meaning(report.result or 0, peer.manners.meanings)}"
             if report.result == MavResult.NO_SPACE and peer.vehicle is not None:
                 sure = peer.vehicle.dialect.items.sure
-                with_home = " with home" if home else ""
-                text += f": {rows} rows{with_home}, and a vehicle like this holds about {sure}"
+                many = f"{rows} rows{' with home' * home}"
+                text += f": {many}, and a vehicle like this holds about {sure}"
             elif report.item is not None:
-                number = report.item - home
-                row = number + (part is MissionType.MISSION)
-                text += f", at item {row}" if number >= 0 else ", at the home row"
-                if part is MissionType.MISSION and mission and 0 <= number < len(mission.items):
-                    text += f" (command {mission.items[number].command})"
+                text += f", at item {row}" if row >= home else ", at the home row"
+                if part is MissionType.MISSION and mission and 0 < row <= len(mission.items):
+                    text += f" (command {mission.items[row - 1].command})"
     said = f". The vehicle says: {'; '.join(report.said)}" if report.said else ""
     return f"{part.title}: {text}{said}{holds}"
 

@@ -158,13 +158,11 @@ def set_parameters(wanted: Mapping[str, float], peer: Peer) -> Talk[tuple[tuple[
     table = () if peer.vehicle is None else peer.vehicle.parameters.values()
     groups = {tuple(each.names): each for each in table if each.name_in(wanted) is not None}
     known = {name for names in groups for name in names}
-    unknown: list[Names] = [(name,) for name in wanted if name not in known]
-    before = Reading({})
-    if not unknown:
+    before = Reading({}, tuple((name,) for name in wanted if name not in known))
+    if not before.missing:
         before = yield from read_parameters(peer, groups)
-        unknown = [*before.missing]
-    if unknown:
-        told = listed([" or ".join(each) for each in unknown])
+    if before.missing:
+        told = listed([" or ".join(each) for each in before.missing])
         return (), f"parameters: the vehicle has no {told}: nothing was set or uploaded"
     asked = {
         name: number

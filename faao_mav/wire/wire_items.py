@@ -81,8 +81,7 @@ def wire_items(
         if unset and item.command in FLOWN_TO and item.frame in GLOBAL_FRAMES:
             told = f"item {index}: {unset} not set, which {who} would take for 0: give the place"
             raise InputError(told)
-    sent = items if vehicle is None else map(vehicle.dialect.sent, items)
-    rows = enumerate(sent, first)
+    rows = enumerate(items if vehicle is None else map(vehicle.dialect.sent, items), first)
     return tuple(wire_item(item, n, current=flown and n == first) for n, item in rows)
 
 

@@ -205,11 +205,9 @@ def remove_outdated(beside: Path) -> None:
         if _is_of_a_run(beside):
             beside.unlink()
     except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:  # nothing can be there
-            return
-        raise InputError(
-            f"{beside}: is of an earlier mission and cannot be removed: {error.strerror}"
-        ) from None
+        if error.errno != errno.ENAMETOOLONG:  # nothing can be there
+            told = f"is of an earlier mission and cannot be removed: {error.strerror}"
+            raise InputError(f"{beside}: {told}") from None
 
 
 def _is_of_a_run(beside: Path) -> bool:
