@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from operator import itemgetter
 
 import numpy as np
@@ -37,9 +38,8 @@ POWER_STEP = 0.01
 """The step of the least power, dB. Chosen: radios are set to tenths."""
 
 ENERGY_SHARE = 1e-3
-"""The step of the least energy, in shares of what the whole duration takes.
-
-Chosen: models of power are less true than that."""
+"""The step of the least energy, in shares of what the whole duration takes; finer than models of
+power are true. Chosen."""
 
 _BITS_PER_DB = math.log2(10) / 10
 """What a link gains of a dB where it is not saturated, bit/s/Hz: the most that capacity gains."""
@@ -49,8 +49,7 @@ _PRECISION, _NEAR = 0.01, 0.15
 which durations are tried on both sides of that of a near energy. Chosen."""
 
 _COMPARED = 50
-"""Durations of straight flights of which the thriftiest is sought, and a tenth of the airspeeds.
-Chosen."""
+"""Straight flights of which the thriftiest is sought, and a tenth of the airspeeds. Chosen."""
 
 _ABOVE = 1e-4
 """The share by which an energy is above what a flight takes that is a start. Chosen: ten times what
@@ -148,6 +147,7 @@ class _Flights:
 
     def __init__(self, plan: Plan, observe: Observer | None) -> None:
         self.plan, self.observe, self.count = plan, observe, 0
+        self.thriftiest = cache(lambda: thriftiest_straight(plan))
         self.last: Solution | None = None
         self.whole = self.last = self.changed({})
         taken = self.whole.problem.energy_of(self.whole.trajectory)
@@ -202,6 +202,7 @@ class _Flights:
             return self.whole
         assert self.last is not None
         step, tried = self.plan.flight.time_step, dict[int, tuple[float, Solution]]()
+        duration, straight = self.thriftiest()
         low, high = fewest_slots(self.plan), self.plan.flight.slots
         fastest = self.plan.max_ground_speed + math.hypot(*self.plan.wind)
         airspeeds = np.linspace(self.plan.vehicle.min_speed, fastest, 10 * _COMPARED)
@@ -220,20 +221,19 @@ class _Flights:
                     found = self.lasting(n, energy, alone=True)
                     tried[n] = self.data(found), found
                     _, self.last = max(tried.values(), key=itemgetter(0))
-            return -tried[n][0] if n in tried else 0.0
+            # without a flight the less the nearer to the duration that takes the least
+            return -tried[n][0] if n in tried else abs(slots * step - duration)
 
         if high >= low:
             within = max(0.5, _PRECISION * high)
             minimize_scalar(missed, bounds=(low, high), method="bounded", options={"xatol": within})
-        if not tried:
-            duration, least = thriftiest_straight(self.plan)
-            if least <= energy:
-                missed(duration / step)
+        if not tried and straight <= energy:
+            missed(duration / step)
         if not tried:
             raise InfeasibleError(
                 f"{self.plan.source}: goal.energy_wh: no flight was found that takes at most "
                 f"{energy / JOULES_PER_WH:.4g} Wh with its relay; straight from start to end it "
-                f"takes {least / JOULES_PER_WH:.4g} Wh, in {duration:g} s"
+                f"takes {straight / JOULES_PER_WH:.4g} Wh, in {duration:g} s"
             )
         return self.last
 

@@ -59,11 +59,9 @@ def test_the_least_duration_is_that_of_trying_all() -> None:
         assert found.plan.flight.duration == least
         assert found.least is not None
         assert found.least.optimizations <= 9
-        if least == min(amounts):
-            assert found.least.below is None
-        else:
-            assert found.least.below is not None
-            assert found.least.below.delivered_rate < found.least.below.plan.needed_rate
+        below = found.least.below
+        assert (below is None) == (least == min(amounts))
+        assert below is None or below.delivered_rate < below.plan.needed_rate
 
 
 def test_the_least_power_is_just_enough() -> None:
@@ -107,10 +105,7 @@ def test_a_goal_out_of_reach_says_what_is_possible() -> None:
             "goal.rate: 9 bit/s/Hz cannot be delivered in 18 s (flight.duration) at 1 and 20 dBm",
             f"at most {most:.4f} bit/s/Hz",
         ),
-        (
-            {"deliver_mbytes": 900, "minimise": "power"},
-            f"at most {BASE.megabytes(most):.4g} megabytes",
-        ),
+        ({"deliver_mbytes": 900, "minimise": "power"}, f"{BASE.megabytes(most):.4g} megabytes"),
     ):
         with pytest.raises(InfeasibleError) as caught:
             optimize(BASE.changed({"goal": goal}))
@@ -122,13 +117,10 @@ def test_a_goal_out_of_reach_says_what_is_possible() -> None:
     st.integers(0, 400),
     st.floats(0, 1),
 )
-def test_the_least_number_is_that_of_trying_all(
-    steps: list[int], without: int, share: float
-) -> None:
+def test_the_least_number_is_that_of_trying_all(steps: list[int], none: int, share: float) -> None:
     values = np.cumsum(steps)
-    surplus = [
-        -np.inf if n <= without else float(v) for n, v in enumerate(values - share * values[-1])
-    ]
+    left = values - share * values[-1]
+    surplus = [-np.inf if n <= none else float(v) for n, v in enumerate(left)]
     high = len(surplus) - 1
     if surplus[high] >= 0:
         least = next(n for n in range(1, high + 1) if surplus[n] >= 0)
@@ -206,9 +198,8 @@ def test_less_energy_delivers_less_in_the_best_duration_of_all(whole: Solution) 
             tried.append(slots * each.delivered_rate)
     assert tried
     assert len(found.w) * found.delivered_rate >= max(tried) * (1 - 1e-3)
-    with pytest.raises(
-        InfeasibleError, match=r"at most 0\.2 Wh .*straight from start to end .* Wh"
-    ):
+    told = r"at most 0\.2 Wh .*straight from start to end .* Wh"
+    with pytest.raises(InfeasibleError, match=told):
         within(0.2)
 
 
@@ -222,8 +213,7 @@ def test_the_least_energy_is_below_the_whole_flights_or_refused(
     assert found.delivered_rate >= found.plan.needed_rate
     assert used(found) < 0.99 * used(whole)
     assert found.least is not None
-    below = found.least.below
-    assert below is not None
+    assert (below := found.least.below) is not None
     assert below.delivered_rate < below.plan.needed_rate
     assert used(below) >= used(found) - 0.02 * used(whole)
     (label, told), *_ = result_lines(Result(found))
@@ -240,6 +230,13 @@ def test_the_least_energy_is_below_the_whole_flights_or_refused(
     found = optimize(COPTER.changed({"goal": {"rate": 0.1, "minimise": "energy"}}))
     assert max(tried) == pytest.approx(round(1 / goal_module.ENERGY_SHARE) - 1)
     assert used(found) == used(whole)
+
+
+def test_the_least_energy_is_no_more_than_a_short_hover_takes() -> None:
+    plan = COPTER.changed({"flight.end": list(COPTER.flight.start), "flight.duration": 30})
+    hover = optimize(plan.changed({"flight.duration": 4}))
+    goal = {"rate": 0.99 * hover.delivered_rate, "minimise": "energy"}
+    assert used(optimize(plan.changed({"goal": goal}))) <= 1.01 * used(hover)
 
 
 HOVER = """
