@@ -101,8 +101,6 @@ def study(
     from faao_mav.study.figure import study_figure
     from faao_mav.study.rows import as_dict, comparison
 
-    if jobs == 0:
-        raise InputError("--jobs 0: give a number of processes, or -1 for one a core")
     plan = read_plan(plan_file)
     cases, kind = asked.cases(plan), (plan.study or Study()).figure
     if asked.frontier is not None and kind != "trajectories":

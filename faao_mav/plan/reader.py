@@ -88,7 +88,7 @@ class Plan(PlanContents):
         Tuples and NumPy's numbers and arrays count as lists and numbers. `source` names it in
         messages; files that it names lie beside it. Raises `PlanError` as `read_plan` does.
         """
-        return parse_plan(dump_yaml(_plain(data, source)), source)
+        return parse_plan(dump_yaml(plain(data, source)), source)
 
     def changed(self, changes: Mapping[str, Any]) -> "Plan":
         """Return the plan with the values at dotted keys of its file replaced, in its units.
@@ -200,15 +200,15 @@ def _word(path: Path, changed: int) -> str:
     return map_word(read_map(path))
 
 
-def _plain(value: Any, source: str) -> Any:
+def plain(value: Any, source: str) -> Any:
     """Return `value` as YAML has it: mappings, lists, numbers, text, true, false and null."""
     match value:
         case Mapping():
-            return {str(key): _plain(inside, source) for key, inside in value.items()}
+            return {str(key): plain(inside, source) for key, inside in value.items()}
         case np.ndarray() | np.generic():
-            return _plain(value.tolist(), source)
+            return plain(value.tolist(), source)
         case list() | tuple():
-            return [_plain(inside, source) for inside in value]
+            return [plain(inside, source) for inside in value]
         case None | bool() | int() | float() | str():
             return value
         case Path():

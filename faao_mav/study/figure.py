@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from faao_mav.errors import InputError
+from faao_mav.errors import InputError, quote
 from faao_mav.plan import Plan
 from faao_mav.plan.keys import POWER
 from faao_mav.report.style import MARKERS, SERIES, drawing, label, mark_stations
@@ -71,8 +71,10 @@ def study_figure(rows: Sequence[StudyRow], plan: Plan, kind: str) -> "Figure":
     >>> study_figure(rows, plan, "delivered").axes[0].get_xlabel()
     'height H, m'
     """
+    if kind not in (*_DRAWN, "trajectories"):
+        raise InputError(f"figure {quote(kind)}: give delivered, rate, data or trajectories")
     counts = {"": 1}  # of the numbers of each key
-    for key in rows[0].values:
+    for key in rows[0].values if rows else ():
         values = [row.values[key] for row in rows]
         if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values):
             counts[key] = len(set(values))
@@ -97,8 +99,7 @@ def _rates(rows: Sequence[StudyRow], plan: Plan, kind: str, axis: str) -> "Figur
         plots = figure.subplots(down, across, squeeze=False, sharex=True).ravel().tolist()
         for plot, (name, inside) in zip(plots, panels.items(), strict=False):
             _lines(plot, inside, axis, measure)
-            title = name or plan.name or "study"
-            label(plot, title, _KEYS.get(axis, (axis,))[0], unit)
+            label(plot, name or plan.name or "study", _KEYS.get(axis, (axis,))[0], unit)
             plot.tick_params(labelbottom=True)  # the plot beneath may be none
         for plot in plots[len(panels) :]:
             plot.remove()
@@ -125,8 +126,7 @@ def _lines(plot: "Axes", rows: Sequence[StudyRow], axis: str, measure: str) -> N
         k = (list(_SCHEMES).index(scheme) + of) % len(SERIES)
         shown = ": ".join(filter(None, (whose, name)))
         plot.plot(x, mean, marker=MARKERS[k], markersize=4, color=SERIES[k], label=shown)
-        band = (mean - deviation, mean + deviation)
-        plot.fill_between(x, *band, color=SERIES[k], alpha=0.2, linewidth=0)
+        plot.fill_between(x, mean - deviation, mean + deviation, color=SERIES[k], alpha=0.2, lw=0)
     plot.set_ylim(bottom=0)
 
 

@@ -62,8 +62,7 @@ def run_study(
     `jobs` processes, -1 for one on each core; or the workers of the Dask `cluster` at an address as
     `tcp://host:8786`, which need this package too. With a `directory` every row is kept there when
     it is done, rows that are there already are not run again, and the table is written at the end.
-    `observe` is told each row, old ones first. Raises `InputError` for a directory or a cluster of
-    no use.
+    `observe` is told each row, old ones first. Raises `InputError` for what is of no use.
 
     >>> from faao_mav import as_array, make_cases, read_plan
     >>> plan = read_plan("missions/copter_relay.yaml")
@@ -72,6 +71,8 @@ def run_study(
     >>> rows["flight.altitude"].tolist(), bool(rows["delivered"][0] > rows["delivered"][1])
     ([60, 120], True)
     """
+    if jobs == 0:
+        raise InputError("jobs 0: give a number of processes, or -1 for one a core")
     with nullcontext() if cluster is None else _connected(cluster):
         old = _prepare(directory, cases) if directory is not None else ()
         tell = observe or (lambda _: None)

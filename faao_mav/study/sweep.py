@@ -16,7 +16,7 @@ from faao_mav.plan import Plan
 from faao_mav.plan.checks import fewest_slots
 from faao_mav.plan.fields import dbm
 from faao_mav.plan.keys import ALIASES, POWER
-from faao_mav.plan.reader import changed
+from faao_mav.plan.reader import changed, plain
 from faao_mav.plan.yaml_text import dump_yaml, load_yaml
 from faao_mav.power import JOULES_PER_WH
 
@@ -138,6 +138,7 @@ def make_cases(
     """
     data = load_yaml(text, source)
     data.pop("study", None)
+    vary = {key: [plain(value, source) for value in values] for key, values in vary.items()}
     _check_count(math.prod(map(len, vary.values())) * len(schemes) * seeds, source)
     check_varied(vary)
     made = []

@@ -136,7 +136,7 @@ def test_what_is_refused(plan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("sets the same", "--vary", "flight.altitude=50", "--vary", "flight.altitude=60"),
         ("sets the same", "--power", "10", "--vary", "radio.relay.power_dbm=20"),
         ("study.schemes[1]: 'rzf' is not accepted; give a list of faao", "--schemes", "faao, rzf"),
-        ("--jobs 0: give", "--jobs", 0),
+        ("jobs 0: give", "--jobs", 0),
         ("--points 3: is for a frontier", "--points", 3),
     ):
         result = run(plan, *arguments, "--out", tmp_path / "out")
@@ -236,8 +236,9 @@ def test_rates_routes_and_causality_are_drawn(plan: Path, whole: Whole, tmp_path
     names = {text.get_text() for text in axes.texts}
     assert names == {"base station", "user", "start", "end"}
     failed = (StudyRow("k", {"power_dbm": 1}, "faao", 0, error="no"),)
-    for kind, rows in (("trajectories", failed), ("delivered", whole[1][:1])):
-        with pytest.raises(InputError, match="nothing to draw"):
+    wrong = (("trajectories", failed), ("delivered", whole[1][:1]), ("rate", ()), ("routes", ()))
+    for kind, rows in wrong:
+        with pytest.raises(InputError, match=r"nothing to draw|figure 'routes': give delivered"):
             study_figure(rows, parse_plan(QUICK), kind)
     # rows of several studies or of none are one table
     ends = [StudyRow("", {"end": [1, 2]}, "faao", 0), StudyRow("", {"end": [3, 4]}, "zf", 0)]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import MISSIONS, SMALL, edited
 from hypothesis import given
@@ -87,7 +88,7 @@ def test_schemes_and_the_grid_of_every_plan_once() -> None:
     assert [each.precoder for each in made] == ["faao", "faao", "mrt"]
     cases = make_cases(
         SMALL,
-        vary={"power_dbm": (0, 10), "radio.modulation": ("bpsk", "qpsk")},
+        vary={"power_dbm": [*np.array([0, 10])], "radio.modulation": ("bpsk", "qpsk")},
         schemes=("faao", "gaussian"),
         seeds=3,
     )
