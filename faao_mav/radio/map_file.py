@@ -227,8 +227,11 @@ class Raster:
         from scipy.ndimage import map_coordinates
 
         x, y = self.from_degrees.transform(longitude, latitude)
-        column, row, _ = np.tensordot(self.to_cell, [x, y, np.ones_like(x)], 1) - 0.5
         rows, columns = self.values.shape
+        if (crs := self.from_degrees.target_crs) and crs.is_geographic:  # across 180, from 0 to 360
+            middle = np.linalg.solve(self.to_cell, [columns / 2, rows / 2, 1])[0]
+            x = middle + np.remainder(x - middle + 180, 360) - 180
+        column, row, _ = np.tensordot(self.to_cell, [x, y, np.ones_like(x)], 1) - 0.5
         on = (np.abs(2 * row - rows + 1) <= rows) & (np.abs(2 * column - columns + 1) <= columns)
         at = np.where(on, row, 0.0), np.where(on, column, 0.0)
         found = map_coordinates(self.values, at, order=1, mode="nearest")
@@ -246,7 +249,7 @@ class Raster:
         x, y = frame.to_local(*self.place(*corners)).T
         east, north = np.linspace(x.min(), x.max(), columns), np.linspace(y.min(), y.max(), rows)
         grid = np.stack(np.meshgrid(east, north), axis=-1)
-        middle = np.array([frame.latitude, frame.longitude])
+        middle = np.array(frame.to_geodetic([0.0, 0.0]))
         return east, north, self.at(*frame.to_geodetic(grid)), middle
 
 
@@ -275,6 +278,7 @@ def read_raster(path: str | Path, what: str, most: int) -> Raster:
                     "cells, coordinates"
                 )
             values = data.read(1, masked=True).astype(np.float64).filled(np.nan)
+            values = values * data.scales[0] + data.offsets[0]
             to_cell = np.linalg.inv(np.reshape([*data.transform], (3, 3)))
             crs = CRS.from_wkt(data.crs.to_wkt())
             from_degrees = Transformer.from_crs("EPSG:4326", crs, always_xy=True)

@@ -156,26 +156,29 @@ def test_a_geotiff_of_any_projection_becomes_a_local_grid(tmp_path: Path) -> Non
     rasterio: Any = pytest.importorskip("rasterio")
     from pyproj import Transformer
 
-    for crs, corner, step in (
-        ("EPSG:4326", (8.0, 47.01), 1e-4),
-        ("EPSG:32632", (424e3, 5207e3), 9),
+    for crs, corner, step, west in (
+        ("EPSG:4326", (8.0, 47.01), 1e-4, 8.0),
+        ("EPSG:4326", (179.996, 47.01), 1e-4, 179.996),
+        ("EPSG:32632", (424e3, 5207e3), 9, 8.0),
     ):
         to_degrees = Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
         x, y = np.meshgrid(
             corner[0] + step * (np.arange(90) + 0.5), corner[1] - step * (np.arange(80) + 0.5)
         )
         longitude, latitude = to_degrees.transform(x, y)
-        db = -90.0 + 1e3 * (latitude - 47.0) - 500 * (longitude - 8.0)
-        db[3, 4] = -9999
+        counts = 4e3 * (latitude - 47.0) - 2e3 * (longitude - west)  # a quarter of a dB each
+        counts[3, 4] = -9999
         path = tmp_path / "a.tif"
         told = {"count": 1, "dtype": "float64", "crs": crs, "nodata": -9999}
         told["transform"] = rasterio.Affine(step, 0, corner[0], 0, -step, corner[1])
         with rasterio.open(path, "w", driver="GTiff", width=90, height=80, **told) as file:
-            file.write(db, 1)
+            file.write(counts, 1)
+            file.scales, file.offsets = (0.25,), (-90.0,)
         found = read_map(path)
         grid = np.stack(np.meshgrid(found.east, found.north), axis=-1)
         latitude, longitude = LocalFrame(*found.origin[:2]).to_geodetic(grid)
-        off = found.db[0] + 90.0 - 1e3 * (latitude - 47.0) + 500 * (longitude - 8.0)
+        east = (longitude - west) % 360
+        off = found.db[0] + 90.0 - 1e3 * (latitude - 47.0) + 500 * east
         assert np.isnan(off).any()
         assert np.nanmax(np.abs(off[3:-3, 3:-3])) < 1e-3  # at the edge it is the nearest cell's
         assert read_raster(path, "a map", 7_200).values.shape == (80, 90)
