@@ -74,7 +74,7 @@ class _Measured:
             if found.left_out and not rows:
                 told = ", or at the least or the greatest rate, which tell none" if steps else ""
                 lost = counted(found.left_out, "row")
-                cli.note(f"{path}: left out: {lost} without a level{told}")
+                cli.note(f"{path}: left out: {lost} without a place or a level{told}")
             over_noise = found.unit == "db"
             if over_noise and (self.power is None) != (self.noise is None):
                 raise InputError(f"{path}: a ratio to the noise; give both --power and --noise")

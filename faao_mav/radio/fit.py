@@ -83,16 +83,17 @@ class Samples:
     def means(self, seconds: float) -> "Samples":
         """Return means over `seconds` of time, of the power and of the place, in flight.
 
-        That is against fast fading. In flight is above half the median height; what is not finite
-        is left out.
+        That is against fast fading. In flight is underway, or above half the median height; what is
+        not finite is left out. Where a clock begins anew, as in the next flight, so does a mean.
         """
         rows = np.column_stack([self.t, self.place, self.level])
         rows = rows[np.isfinite(rows).all(axis=1) & (self.place[:, 2] > 0.0)]
-        rows = rows[rows[:, 3] > (0.5 * np.median(rows[:, 3]) if len(rows) else 0.0)]
         rows[:, 4] = 10.0 ** (rows[:, 4] / 10.0)
-        group = np.unique(np.floor(rows[:, 0] / seconds), return_inverse=True)[1]
-        t, *place, power = (np.bincount(group, x) / np.bincount(group) for x in rows.T)
-        return replace(self, t=t, place=np.stack(place, axis=1), level=10.0 * np.log10(power))
+        group = np.cumsum(np.diff(np.floor(rows[:, 0] / seconds), prepend=-math.inf) != 0) - 1
+        rows = np.stack([np.bincount(group, x) / np.bincount(group) for x in rows.T], axis=1)
+        moved = lengths(np.diff(rows[:, 1:3], axis=0, prepend=rows[:1, 1:3]))
+        rows = rows[(moved > _PACE) | (rows[:, 3] > np.median([0.0, *rows[:, 3]]) / 2)]
+        return replace(self, t=rows[:, 0], place=rows[:, 1:4], level=10.0 * np.log10(rows[:, 4]))
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -22,7 +22,7 @@ _MOST_BYTES = 200_000_000
 """Bytes of a table that are read at most; chosen: a day of ten rows a second."""
 
 _FARTHEST = 100_000.0
-"""Metres from the station beyond which positions are taken for mistaken. Chosen."""
+"""Metres from the station beyond which a position is mistaken, as one without a fix. Chosen."""
 
 _COLUMNS = {
     row["column"]: (
@@ -40,7 +40,7 @@ SIK_STEP, _SIK_AT_ZERO = 1.0 / 1.9, -127.0
 Configuration", which calls it approximate)."""
 
 _SOUND = {"dbm": (-200.0, 60.0), "db": (-60.0, 120.0)}
-"""The least and the greatest level of a unit; beyond them it is another unit."""
+"""The least and the greatest level of a unit; a row beyond them tells none, a table has another."""
 
 
 def read_measured(
@@ -58,7 +58,8 @@ def read_measured(
     of columns whose header does not tell them; `calibration` are one or two counts of a device, and
     the dBm that they are. A throughput is told as the SNR at which the radio has it by its `rates`,
     Mbit/s. `rows`, the first a header, are those of a log, which is no table. Rows that tell no
-    level, as at the least and the greatest rate, are left out. Raises `InputError` otherwise.
+    level, as at the least and the greatest rate, or no place, are left out. Raises `InputError`
+    otherwise.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -95,7 +96,9 @@ def read_measured(
             "a flight about it: are latitude and longitude exchanged?"
         )
     place = np.column_stack([local, altitude - station[2]])
-    return Samples(t, place, level, printable(path.name), unit, int(np.sum(~sound)))
+    kept = (least <= level) & (level <= most) & (np.linalg.norm(place, axis=1) < _FARTHEST)
+    left_out, name = len(sound) - int(np.sum(kept)), printable(path.name)
+    return Samples(t[kept], place[kept], level[kept], name, unit, left_out)
 
 
 def _rows(path: Path) -> list[list[str]]:

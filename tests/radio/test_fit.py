@@ -105,6 +105,15 @@ def test_what_is_not_finite_or_not_flown_is_left_out() -> None:
     assert off(fit, (-45.0, 2.0)) < 3.0
 
 
+def test_a_low_leg_is_flown_too_and_a_clock_may_begin_anew() -> None:
+    parts = [flight(30.0, rows=2), flight(110.0)]
+    rows = [np.column_stack([each.t, each.place, each.level]) for each in parts]
+    t, *place, level = np.concatenate(rows).T
+    found = Samples(t, np.stack(place, axis=1), level).means(2.0)
+    apart = np.concatenate([each.means(2.0).place for each in parts])
+    np.testing.assert_allclose(found.place, apart[1:])  # the first is not known to be underway
+
+
 def test_one_leg_gives_the_level_alone() -> None:
     one = flight(50.0, rows=1)
     fit = fit_link(levels([one], (-45.0, 2.0, 30.0, -20.0), 3.0, 30.0, 0))
@@ -248,10 +257,12 @@ def test_decimal_commas_times_of_day_and_rows_without_a_number(tmp_path: Path) -
     rows = [f"2024-05-01T10:00:{k:02d}Z;-34,999;149,0;60,0;1{k % 10},5" for k in range(20)]
     rows[3], rows[7], rows[9] = "not a row", "2024-05-01T10:00:07Z;-34,999;149,0;60,0;NaN", ""
     rows[5] = "2024-05-01T10:00:05Z;-34,999;149,0;60,0;2024-05-01"  # of times alone a number
+    rows[11] = "2024-05-01T10:00:11Z;0;0;60,0;11,5"  # no fix
+    rows[12] = "2024-05-01T10:00:12Z;-34,999;149,0;60,0;9999"  # no level
     path = tmp_path / "levels.csv"
     path.write_text("\n".join(["# a remark", header, *rows]))
     found = read_measured(path, ANTENNA)
-    assert (len(found.t), found.left_out) == (16, 3)
+    assert (len(found.t), found.left_out) == (14, 5)
     assert (np.ptp(found.t), found.level[0]) == (19.0, 10.5)
 
 
