@@ -50,11 +50,12 @@ _STEEPEST = 10.0
 _PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
-_LAGS, _LENGTHS = np.arange(0.0, 310.0, 10.0), np.geomspace(1.0, 1000.0, 1000)
-"""Bounds, m, of the distances between two places at which residuals are compared, and the lengths
-of correlation that are tried. Chosen."""
+_LAG, _FAR, _LONGEST = 10.0, 300.0, 0.25
+"""Residuals at two places are compared by steps of so many m of their distance, up to so far, and
+the longest correlation is that share of the farthest: a longer one is not told from the level.
+Chosen."""
 
-_MOST_PAIRED = 2000
+_MOST_PAIRED = 700
 """Means that are compared with each other at most, for time and memory. Chosen."""
 
 
@@ -102,12 +103,12 @@ class LinkFit:
 
     `reference_gain_db` is the gain at 1 m, within the constant of what was measured; `exponent` is
     n, `elevation_db` are c_1, c_2, ... `errors` are one standard error of these three (0 of a given
-    exponent), by leaving out legs one by one; `gain_error_db` is that of the gain where it was
-    flown. `spread_db` is the rms of measured against fitted at what was left out of a fit, as is
-    `paper_spread_db`, that of d^-2; `correlation_m` is the distance over which the correlation of
-    residuals falls to 1/e. `elevation_deg` and `distance_m` are the least and the greatest of the
-    `means`; so many `legs` and `heights` were left out one by one. `flown` are the means, `leg`
-    (k,) is the number of each one's leg.
+    exponent), as shadowing that is so correlated has it; `gain_error_db` is that of the gain where
+    it was flown. `spread_db` is the rms of measured against fitted at what was left out of a fit,
+    as is `paper_spread_db`, that of d^-2; `correlation_m` is the distance over which the
+    correlation of shadowing falls to 1/e. `elevation_deg` and `distance_m` are the least and the
+    greatest of the `means`; so many `legs` and `heights` were left out one by one. `flown` are the
+    means, `leg` (k,) is the number of each one's leg.
 
     >>> t = np.arange(0.0, 200.0)
     >>> place = np.stack([300.0 * np.cos(t / 9), 8.0 * t - 700.0, 40.0 + 0.2 * t], axis=1)
@@ -180,7 +181,7 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     columns = np.insert(columns, 1, -10.0 * np.log10(d), axis=1)
     left_y = y - 2.0 * columns[:, 1]  # that level, n - 2 and terms are to tell, a column each
     laws = [[0, *free, *range(2, 2 + terms)] for free in ([], [1]) for terms in range(_TERMS + 1)]
-    found: list[tuple[list[int], Real, Real, list[float]]] = []  # each better than those before
+    found: list[tuple[list[int], Real, list[float]]] = []  # each better than those before
     for law in sorted(laws, key=len) if leg.any() else [[0]]:  # of one leg none can be left out
         A, c, errors = columns[:, law], np.zeros(2 + _TERMS), []
         for part in (height, leg):
@@ -190,27 +191,26 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
         c[law] = each[0]
         terms = np.polyval([*c[:1:-1], 0.0], np.linspace(0.0, 1.0, 101))
         sound = 0.0 <= 2.0 + c[1] <= _STEEPEST and np.ptp(terms) <= _SWING
-        if not found or (sound and np.mean(errors) < (1.0 - _PAYS) * np.mean(found[-1][3])):
-            found.append((law, c, each[1:], errors))
-    law, c, without, (spread, *_) = found[-1]
-    count, away, used = int(leg[-1]) + 1, np.full((1, len(law)), math.inf), max(law[-1], 1) + 1
-    if count > 1:  # the jackknife
-        away = np.sqrt((count - 1) / count) * (without - without.mean(axis=0))
-    errors_of = np.zeros_like(c)
-    errors_of[law] = np.linalg.norm(away, axis=0)
+        if not found or (sound and np.mean(errors) < (1.0 - _PAYS) * np.mean(found[-1][2])):
+            found.append((law, c, errors))
+    law, c, (spread, *_) = found[-1]
+    A, used, errors_of = columns[:, law], max(law[-1], 1) + 1, np.zeros_like(c)
+    length, covariance = _shadowing(place, left_y - columns @ c, A)
+    covariance = covariance if leg.any() else np.full_like(covariance, math.inf)
+    errors_of[law] = np.sqrt(np.diag(covariance))
     return LinkFit(
         reference_gain_db=float(c[0]),
         exponent=2.0 + float(c[1]),
         elevation_db=tuple(c[2:used].tolist()),
         errors=tuple(errors_of[:used].tolist()),
-        gain_error_db=_rms(np.linalg.norm(columns[:, law] @ away.T, axis=1)),
+        gain_error_db=_rms(np.sqrt(np.sum(A @ covariance * A, axis=1))),
         spread_db=spread,
-        paper_spread_db=found[0][3][0],
-        correlation_m=_correlation(place, left_y - columns @ c),
+        paper_spread_db=found[0][2][0],
+        correlation_m=length,
         elevation_deg=(float(angle.min()), float(angle.max())),
         distance_m=(float(d.min()), float(d.max())),
         means=len(y),
-        legs=count,
+        legs=int(leg[-1]) + 1,
         heights=int(height.max()) + 1,
         flown=Samples(t, place, y, source),
         leg=leg,
@@ -269,17 +269,28 @@ def _heights(up: Real, leg: Integers) -> Integers:
     return np.searchsorted((level[cuts] + level[cuts + 1]) / 2.0, up)
 
 
-def _correlation(place: Real, residual: Real) -> float:
-    """Return the L, m, for which exp(-distance/L) is nearest to the residuals' correlation."""
-    from scipy.spatial.distance import pdist
+def _shadowing(place: Real, residual: Real, A: Real) -> tuple[float, Real]:
+    """Return the L, m, of shadowing with exp(-distance/L), and the covariance of c that it gives.
+
+    What a fit of A c leaves of it has the residuals' size and is nearest to their products.
+    """
+    from scipy.spatial.distance import cdist
 
     every = -(-len(residual) // _MOST_PAIRED)
-    away, rest = pdist(place[::every]), residual[::every]
-    product = np.outer(rest, rest)[np.triu_indices(len(rest), 1)]
-    pairs, total = (np.histogram(away, _LAGS, weights=x)[0] for x in (None, product))
-    model = np.exp(-(_LAGS[:-1] + 5.0) / _LENGTHS[:, None])
-    apart = np.mean(residual**2) * model**2 @ pairs - 2.0 * model @ total
-    return float(_LENGTHS[apart.argmin()])
+    place, residual, A = place[::every], residual[::every], A[::every]
+    away, inverse, best = cdist(place, place), np.linalg.pinv(A), (math.inf, 0.0, A)
+    near = np.triu(away < _FAR, 1)
+    lag = (away[near] / _LAG).astype(int)
+    pairs, total = (np.bincount(lag, x[near]) for x in (near, np.outer(residual, residual)))
+    for L in np.geomspace(1.0, np.clip(_LONGEST * away.max(), 1.0, 1000.0), 50).tolist():
+        shadow = np.exp(-away / L)
+        left = shadow - A @ (inverse @ shadow)
+        left -= left @ inverse.T @ A.T
+        scale = float(residual @ residual / np.trace(left))
+        apart = total - scale * np.bincount(lag, left[near])
+        error = float(apart @ (apart / np.maximum(pairs, 1.0)))
+        best = min(best, (error, L, scale * inverse @ shadow @ inverse.T), key=lambda x: x[0])
+    return best[1:]
 
 
 def _rms(x: Real) -> float:

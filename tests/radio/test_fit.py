@@ -70,6 +70,14 @@ def test_laws_are_found_within_their_stated_errors() -> None:
         assert fit.holds
 
 
+def test_errors_are_those_of_shadowing_correlated_beyond_a_leg() -> None:
+    gain, flown = (-45.0, 2.0), [flight(60.0)]
+    fits = [fit_link(levels(flown, gain, 6.0, 60.0, seed)) for seed in range(8)]
+    missed, told = np.mean([[off(fit, gain) ** 2, fit.gain_error_db**2] for fit in fits], axis=0)
+    assert 0.4 * told < missed < 2.0 * told
+    assert np.median([fit.correlation_m for fit in fits]) > 40.0
+
+
 @settings(max_examples=10)
 @given(
     level=st.floats(-70, -20),
