@@ -168,7 +168,7 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
     t, place, y = (np.concatenate([getattr(f, x) for f in flown]) for x in ("t", "place", "level"))
     source, counts = ", ".join(dict.fromkeys(f.source for f in flown)), [len(f.t) for f in flown]
     if len(y) < _LEAST or not all(counts):
-        text = f"{', '.join(map(str, counts))} means over {seconds:g} s in flight"
+        text = f"{', '.join(map(str, counts))} means over {seconds:g} s in flight above the station"
         raise InputError(f"{source}: {text}; expected at least {_LEAST}, and some of each")
     if np.ptp(place, axis=0).max() < 1.0:
         raise InputError(f"{source}: one place alone; expected a flight")

@@ -56,10 +56,10 @@ def read_measured(
     Levels are rsrp, rssi, snr or throughput. `station` is latitude and longitude, degrees, and
     height, m, of the antenna of the station, above what the altitudes are above. `units` are those
     of columns whose header does not tell them; `calibration` are one or two counts of a device, and
-    the dBm that they are. A throughput is told as the SNR at which the radio has it by its `rates`,
-    Mbit/s. `rows`, the first a header, are those of a log, which is no table. Rows that tell no
-    level, as at the least and the greatest rate, or no place, are left out. Raises `InputError`
-    otherwise.
+    the dBm that they are. A throughput is told as the middle of the SNRs at which the radio has it
+    by its `rates`, Mbit/s. `rows`, the first a header, are those of a log, which is no table. Rows
+    that tell no place or level, as at the greatest rate, are left out. Raises `InputError` for
+    what is no flight.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -132,7 +132,8 @@ def _level(
         if rates is None or not rates.rates:
             raise InputError(f"{path}: a throughput; give --rates, the radio's, some above 0")
         told = np.where(told < rates.most, told, np.nan)
-        return np.interp(told, rates.rates, rates.snr_db, left=np.nan), "db"
+        middle = np.add(rates.snr_db, np.diff(rates.snr_db, append=rates.snr_db[-1]) / 2)
+        return np.interp(told, rates.rates, middle, left=np.nan), "db"
     if unit == "raw" and len(calibration) < 2:
         raise InputError(
             f"{path}: a device's own counts; expected two of them in dBm by --calibrate "

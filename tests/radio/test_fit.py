@@ -227,8 +227,8 @@ def test_headers_tell_what_is_measured(tmp_path: Path) -> None:
         ("time_s,latitude,longitude,altitude_m,rsrp_dbm", -80.5, "dbm", -80.5),
         ("Time [s],Lat (deg),Lon (deg),Alt (m),RSRP [dBm]", -80.5, "dbm", -80.5),
         ("t,lat,lng,height_m,SINR (dB)", 12.0, "db", 12.0),
-        ("timestamp_s,latitude,longitude,altitude_m,throughput_mbit_per_s", 20.0, "db", 10.0),
-        ("time_s,lat,lon,altitude_m,throughput kbit/s", 13000.0, "db", 7.5),
+        ("timestamp_s,latitude,longitude,altitude_m,throughput_mbit_per_s", 20.0, "db", 12.5),
+        ("time_s,lat,lon,altitude_m,throughput kbit/s", 13000.0, "db", 10.0),
         ("time_s,lat,lon,alt_m,rssi_sik", 133, "dbm", -57.0),
     ):
         found = read_measured(table(tmp_path, header, level), ANTENNA, rates=RATES)
