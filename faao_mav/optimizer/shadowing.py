@@ -28,24 +28,16 @@ from faao_mav.radio.spline import Spline
 SHADOWINGS = 400
 """Shadowings of which quantiles are told: their error is 7 % of the standard deviation. Chosen."""
 
-_WAVES = 64
-"""Waves of which a field is the sum. Chosen."""
-
-_REACH, _OFFSETS = 4.0, 25
-"""Standard deviations, and points between, at which rates are known; linear between. Chosen."""
+_WAVES, _REACH, _OFFSETS = 64, 4.0, 25
+"""Waves of which a field is the sum; standard deviations, and points between, at which rates are
+known, linear between. Chosen."""
 
 _TINY = 1e-12
 """A rate, bit/s/Hz, and a variance that count as none."""
 
-_CELLS = 64
-"""Points along each side of the map of that shadowing. Chosen."""
-
-_PLACES = 1000
-"""Places of the flight of which it is the sum, at most. Chosen."""
-
-_ROUND = 0.25
-"""Part of D over which its correlation is rounded at its peak. Chosen."""
-
+_CELLS, _PLACES, _ROUND = 64, 1000, 0.25
+"""Points along each side of the map of that shadowing; places of the flight of which it is the sum,
+at most; part of D over which its correlation is rounded at its peak. Chosen."""
 
 Rates: TypeAlias = Callable[[float], Real]
 """The rates of both hops (2, n), bits, where all gains are so many dB above the law."""

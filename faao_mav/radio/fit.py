@@ -40,23 +40,18 @@ _PACE = 1.0
 APART = 10.0
 """Metres between heights that are left out one by one. Chosen: twice what a copter holds."""
 
-_SWING = 40.0
-"""dB by which the terms of the elevation may differ between the horizon and the zenith. Chosen:
-deeper nulls of antennas are no polynomial's, and beyond what was flown one may do anything."""
-
-_STEEPEST = 10.0
-"""The greatest exponent of a law, the least being 0: what a plan takes."""
+_SWING, _STEEPEST = 40.0, 10.0
+"""dB by which the terms of the elevation may differ between the horizon and the zenith (chosen:
+deeper nulls of antennas are no polynomial's, and beyond what was flown one may do anything), and
+the greatest exponent, the least being 0: what a plan takes."""
 
 _PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
-_LAG, _FAR, _LONGEST = 10.0, 300.0, 0.25
+_LAG, _FAR, _LONGEST, _MOST_PAIRED = 10.0, 300.0, 0.25, 700
 """Residuals at two places are compared by steps of so many m of their distance, up to so far, and
-the longest correlation is that share of the farthest: a longer one is not told from the level.
-Chosen."""
-
-_MOST_PAIRED = 700
-"""Means that are compared with each other at most, for time and memory. Chosen."""
+the longest correlation is that share of the farthest: a longer one is not told from the level. So
+many means are compared at most, for time. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,8 +75,7 @@ class GainMap:
 
     def covers(self, place: Sequence[float]) -> bool:
         """Return whether a place [east, north], m, is on the map."""
-        sides = zip(place, (self.east, self.north), strict=True)
-        return all(side[0] <= x <= side[-1] for x, side in sides)
+        return all(s[0] <= x <= s[-1] for x, s in zip(place, (self.east, self.north), strict=True))
 
     def at(self, height: float) -> "Grid":
         """Return the map at a `height`, m; at the nearest of its own where that is beyond them.

@@ -19,11 +19,9 @@ _MOST_MEANS = 1000
 _NUGGETS, _LENGTHS = (0.3, 0.5, 0.7, 0.9), (0.5, 1.0, 2.0)
 """Shares nu, and lengths L over that of the fit, that are tried. Chosen."""
 
-_REACH = 2.0
-"""Lengths L beyond the log to which the map goes. Chosen: an eighth is left there."""
-
-_MOST_POINTS, _MOST_UP = 120, 8
-"""Steps of the map each way and up at most. Chosen."""
+_REACH, _MOST_POINTS, _MOST_UP = 2.0, 120, 8
+"""Lengths L beyond the log to which the map goes, where an eighth is left, and its steps each way
+and up at most. Chosen."""
 
 
 def kriged(fit: LinkFit, station: Sequence[float]) -> tuple[GainMap | None, float, float]:

@@ -217,8 +217,7 @@ class Raster:
     def step(self) -> float:
         """Metres from middle to middle, along rows or columns, whichever are less."""
         rows, columns = np.array(self.values.shape) / 2 - 0.5
-        at = rows + np.array([0.0, 1.0, 0.0]), columns + np.array([0.0, 0.0, 1.0])
-        latitude, longitude = self.place(*at)
+        latitude, longitude = self.place(rows + np.array([0, 1, 0]), columns + np.array([0, 0, 1]))
         local = LocalFrame(latitude[0], longitude[0]).to_local(latitude, longitude)
         return float(np.hypot(*local[1:].T).min())
 
@@ -243,14 +242,13 @@ class Raster:
         That is east (k,), north (m,), values (m, k), latitude and longitude of the middle.
         """
         rows, columns = self.values.shape
-        latitude, longitude = self.place(np.array((rows - 1) / 2), np.array((columns - 1) / 2))
-        frame = LocalFrame(float(latitude), float(longitude))
+        middle = self.place(np.array((rows - 1) / 2), np.array((columns - 1) / 2))
+        frame = LocalFrame(*map(float, middle))
         corners = np.array([0.0, 0.0, rows - 1, rows - 1]), np.array([0.0, columns - 1] * 2)
         x, y = frame.to_local(*self.place(*corners)).T
         east, north = np.linspace(x.min(), x.max(), columns), np.linspace(y.min(), y.max(), rows)
         grid = np.stack(np.meshgrid(east, north), axis=-1)
-        middle = np.array(frame.to_geodetic([0.0, 0.0]))
-        return east, north, self.at(*frame.to_geodetic(grid)), middle
+        return east, north, self.at(*frame.to_geodetic(grid)), np.array(frame.to_geodetic([0, 0]))
 
 
 def read_raster(path: str | Path, what: str, most: int) -> Raster:

@@ -24,11 +24,9 @@ _LIGHT = 299_792_458.0
 _EARTH = 8.5e6
 """The effective radius of the earth, m, in a standard atmosphere (P.526, section 2)."""
 
-_MOST_HEIGHTS = 25_000_000
-"""Heights of the largest file: two tiles by a second of arc, 200 MB. Chosen."""
-
-_MOST_CELLS = 2000
-"""Points a side of the terrain that profiles are taken from. Chosen: 4 million numbers."""
+_MOST_HEIGHTS, _MOST_CELLS = 25_000_000, 2000
+"""Heights of the largest file, two tiles by a second of arc (200 MB), and points a side of the
+terrain that profiles are taken from. Chosen."""
 
 
 def free_space_db(frequency: float) -> float:

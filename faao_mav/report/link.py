@@ -47,12 +47,11 @@ def fitted(fit: LinkFit, absolute: bool, station: tuple[float, ...] | None = Non
     record = {each.name: getattr(fit, each.name) for each in fields(fit)}
     del record["flown"], record["leg"]
     record["holds"] = fit.holds
-    if not absolute:
-        record["reference_gain_db"] = None
     (near, far), (least, most) = fit.distance_m, fit.elevation_deg
     ranges = f"{near:.0f} to {far:.0f} m away, {least:.0f} to {most:.0f} degrees high"
     lines = [("gain", str(fit)), ("measured", f"{ranges}; {rests_on}")]
     if not absolute:
+        record["reference_gain_db"] = None
         told = "shape only: the plan's radio.reference_gain_db stands; give --power for the level"
         lines[:1] = [("gain", f"{fit}, within a constant"), ("", told)]
     if fit.legs == 1:

@@ -84,9 +84,12 @@ def tile(folder: Path, heights: Any, side: int = 1201, name: str = "N47E008.hgt"
     return path
 
 
+def ridge(x: Real, _: Real) -> Real:
+    return np.asarray(500 + 100 * np.exp(-(((x - 400) / 150) ** 2)))
+
+
 def test_a_ridge_hides_what_is_behind_it(tmp_path: Path) -> None:
-    path = tile(tmp_path, lambda x, _: 500 + 100 * np.exp(-(((x - 400) / 150) ** 2)))
-    raster, unknown = read_terrain(path)
+    raster, unknown = read_terrain(tile(tmp_path, ridge))
     assert unknown == 0
     assert raster.step == pytest.approx(62.7, abs=0.1)
     heard: list[tuple[str, int, int]] = []
@@ -109,14 +112,10 @@ def test_a_ridge_hides_what_is_behind_it(tmp_path: Path) -> None:
 
 def test_a_path_loses_as_much_from_either_end(tmp_path: Path) -> None:
     """Over a ridge in the middle: with the mast as high as the aircraft was, and the other way."""
-    raster, _ = read_terrain(
-        tile(tmp_path, lambda x, _: 500 + 100 * np.exp(-(((x - 400) / 150) ** 2)))
-    )
+    raster, _ = read_terrain(tile(tmp_path, ridge))
     there, back = (
-        terrain_map([raster], (*STATION[:2], mast), 2.4e9, (height,), 0.0, 800.0, 50.0).db[
-            0, 16, -1
-        ]
-        for mast, height in ((10.0, 60.0), (60.0, 10.0))
+        terrain_map([raster], (*STATION[:2], mast), 2.4e9, (up,), 0.0, 800.0, 50.0).db[0, 16, -1]
+        for mast, up in ((10.0, 60.0), (60.0, 10.0))
     )
     assert there < -20
     assert back == pytest.approx(there, abs=0.2)
