@@ -45,7 +45,7 @@ _SWING, _STEEPEST = 40.0, 10.0
 deeper nulls of antennas are no polynomial's, and beyond what was flown one may do anything), and
 the greatest exponent, the least being 0: what a plan takes."""
 
-_PAYS = 0.002
+PAYS = 0.002
 """The share of the error that more parameters must save. Chosen: less is chance."""
 
 _LAG, _FAR, _LONGEST, _MOST_PAIRED = 10.0, 300.0, 0.25, 700
@@ -186,7 +186,7 @@ def fit_link(flights: Sequence[Samples], seconds: float = 2.0) -> LinkFit:
         c[law] = each[0]
         terms = np.polyval([*c[:1:-1], 0.0], np.linspace(0.0, 1.0, 101))
         sound = 0.0 <= 2.0 + c[1] <= _STEEPEST and np.ptp(terms) <= _SWING
-        if not found or (sound and np.mean(errors) < (1.0 - _PAYS) * np.mean(found[-1][2])):
+        if not found or (sound and np.mean(errors) < (1.0 - PAYS) * np.mean(found[-1][2])):
             found.append((law, c, errors))
     law, c, (spread, *_) = found[-1]
     A, used, errors_of = columns[:, law], max(law[-1], 1) + 1, np.zeros_like(c)

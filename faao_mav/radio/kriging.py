@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from faao_mav.arrays import Integers, Real
-from faao_mav.radio.fit import APART, LinkFit
+from faao_mav.radio.fit import APART, PAYS, LinkFit
 from faao_mav.radio.gain_map import GainMap
 
 _MOST_MEANS = 1000
@@ -35,7 +35,7 @@ def kriged(fit: LinkFit, station: Sequence[float]) -> tuple[GainMap | None, floa
     residual = fit.flown.level[::every] - fit.gain_db(place)
     away = np.linalg.norm(place[:, None] - place, axis=-1)
     alone = float(np.sqrt(np.mean(residual**2)))
-    found, error, length = None, alone, 0.0
+    found, error, length = None, (1.0 - PAYS) * alone, 0.0
     for L in np.maximum(1.0, fit.correlation_m * np.array(_LENGTHS)):
         for nugget in _NUGGETS:
             inverse = np.linalg.inv(

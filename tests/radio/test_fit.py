@@ -127,6 +127,7 @@ def test_one_leg_gives_the_level_alone() -> None:
     assert fit.legs == 1
     assert (fit.exponent, fit.elevation_db) == (2.0, ())
     assert fit.gain_error_db == np.inf
+    assert kriged(fit, STATION)[0] is None
 
 
 def test_no_flight_is_refused() -> None:
