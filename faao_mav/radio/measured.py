@@ -21,8 +21,9 @@ from faao_mav.radio.rate_steps import RateSteps
 _MOST_BYTES = 200_000_000
 """Bytes of a table that are read at most; chosen: a day of ten rows a second."""
 
-_FARTHEST = 100_000.0
-"""Metres from the station beyond which a position is mistaken, as one without a fix. Chosen."""
+_FARTHEST, _SLOWEST = 100_000.0, 60.0
+"""Metres from the station beyond which a position is mistaken, as one without a fix; seconds from
+row to row beyond which they are of another unit. Chosen."""
 
 _COLUMNS = {
     row["column"]: (
@@ -86,6 +87,8 @@ def read_measured(
     if not least <= middle <= most:
         text = f"levels about {middle:g} {unit}; expected {least:g} to {most:g}: is that the unit?"
         raise InputError(f"{path}: {text}")
+    if (step := float(np.median(np.diff(t, prepend=t[0])))) > _SLOWEST:
+        raise InputError(f"{path}: {step:g} s from row to row; give the unit, as --unit time=ms")
     local = LocalFrame(station[0], station[1]).to_local(latitude, longitude)
     away = float(np.median(np.hypot(*local.T)))
     if not away < _FARTHEST:

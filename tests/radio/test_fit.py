@@ -78,11 +78,7 @@ def test_errors_are_those_of_shadowing_correlated_beyond_a_leg() -> None:
 
 
 @settings(max_examples=10)
-@given(
-    level=st.floats(-70, -20),
-    exponent=st.floats(1.6, 4.0),
-    terms=st.lists(st.floats(-15, 15), max_size=2),
-)
+@given(st.floats(-70, -20), st.floats(1.6, 4.0), st.lists(st.floats(-15, 15), max_size=2))
 def test_without_noise_the_law_itself_is_found(
     level: float, exponent: float, terms: list[float]
 ) -> None:
@@ -236,8 +232,13 @@ def test_units_that_a_header_does_not_tell_are_asked_for(tmp_path: Path) -> None
     path = table(tmp_path, "time,lat,lon,alt,rssi", -70)
     with pytest.raises(InputError, match=r"'alt' has no unit.*--unit altitude=UNIT, one of m"):
         read_measured(path, ANTENNA)
-    found = read_measured(path, ANTENNA, {"altitude": "ft", "rssi": "dBm"})
+    units = {"altitude": "ft", "rssi": "dBm"}
+    found = read_measured(path, ANTENNA, units)
     np.testing.assert_allclose(found.place[:, 2], 60 * 0.3048 - 10)
+    path.write_text(path.read_text().replace(",-34", "000,-34"))
+    with pytest.raises(InputError, match="1000 s from row to row; give the unit, as --un"):
+        read_measured(path, ANTENNA, units)
+    assert read_measured(path, ANTENNA, units | {"time": "ms"}).t[-1] == 19.0
 
 
 def test_counts_of_a_device_are_calibrated(tmp_path: Path) -> None:

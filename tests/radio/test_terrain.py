@@ -79,8 +79,7 @@ def tile(folder: Path, heights: Any, side: int = 1201, name: str = "N47E008.hgt"
     east = (WEST + degrees - STATION[1]) * 75_300.0  # of a degree of longitude at 47.5 north
     north = (SOUTH + 1 - degrees - STATION[0]) * 111_180.0
     values = np.broadcast_to(heights(*np.meshgrid(east, north)), (side, side))
-    path = folder / name
-    path.write_bytes(np.round(values).astype(">i2").tobytes())
+    np.round(values).astype(">i2").tofile(path := folder / name)
     return path
 
 
@@ -125,8 +124,7 @@ def test_clutter_stands_on_the_ground_but_at_the_station(tmp_path: Path) -> None
     """Its tops are the horizon of whoever stands below them."""
     raster, _ = read_terrain(tile(tmp_path, lambda *_: 500.0))
     bare, wood = (
-        terrain_map([raster], STATION, 2.4e9, (30.0,), clutter, 500.0, 100.0)
-        for clutter in (0.0, 20.0)
+        terrain_map([raster], STATION, 2.4e9, (30.0,), up, 500.0, 100.0) for up in (0.0, 20.0)
     )
     assert (bare.db == 0).all()
     assert wood.ground is not None
@@ -164,10 +162,8 @@ def test_heights_that_are_not_known_are_the_nearest_and_others_refused(tmp_path:
 
 def test_tiles_south_and_west_have_their_corner_there(tmp_path: Path) -> None:
     side = np.arange(1201)
-    path = tmp_path / "S36W071.hgt"
-    path.write_bytes(np.add.outer(-side, side).astype(">i2").tobytes())
+    np.add.outer(-side, side).astype(">i2").tofile(path := tmp_path / "S36W071.hgt")
     raster = read_raster(path, "heights", 10**7)
-    heights = raster.at(
-        np.array([-35.0, -36.0, -35.5, -36.1]), np.array([-71.0, -70.0, -70.25, -70.5])
-    )
+    north, east = np.array([[-35.0, -71], [-36.0, -70], [-35.5, -70.25], [-36.1, -70.5]]).T
+    heights = raster.at(north, east)
     np.testing.assert_allclose(heights, [0, 0, 300, np.nan], atol=1e-6)
