@@ -42,7 +42,7 @@ class Orbit:
 
     It is flown for so many `turns`, or for so many `seconds`; if it `climbs` until it is at its
     height, and if it is `endless` for good, of which `turns` are predicted. `clockwise` as seen
-    from above. Places are m east + i m north.
+    from above; left from where it ends if `tangent`, else along the line from the middle.
     """
 
     radius: float
@@ -51,6 +51,7 @@ class Orbit:
     seconds: float = 0.0
     climbs: bool = False
     endless: bool = False
+    tangent: bool = False
     turn_rate: float = math.inf
 
     def speed(self, commanded: float) -> float:

@@ -129,7 +129,7 @@ class _Walk:
     def take(self, index: int, item: MissionItem) -> None:
         """Fly or obey one item."""
         match item.command:
-            case _ if (orbit := self._vehicle.orbit(item)) is not None:
+            case _ if (orbit := self._vehicle.orbit(item, self._mission.home)) is not None:
                 self._circle(index, self._spot(index, item), orbit)
             case Command.NAV_TAKEOFF | Command.NAV_VTOL_TAKEOFF:
                 self._take_off(index, item)
@@ -251,7 +251,7 @@ class _Walk:
             up = np.array([*self._place[:2], place[2]])
             self._go(index, up, self._vehicle.climb_time(rise))
         self._speed = self._model.cruise_speed
-        if (waiting := self._vehicle.waiting) is not None:
+        if waiting := self._vehicle.waiting(self._mission.home, float(place[2])):
             self._circle(index, place, waiting)
         else:
             self._land(index, place[:2])

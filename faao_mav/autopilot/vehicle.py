@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from faao_mav.arrays import Real
-from faao_mav.autopilot.body import Body, CopterBody
+from faao_mav.autopilot.body import Body, CopterBody, density_ratio
 from faao_mav.autopilot.model import Model, Orbit
 from faao_mav.autopilot.vehicle_type import AutopilotFamily, VehicleType, lean_acceleration
 from faao_mav.errors import InputError
 from faao_mav.geodesy import LocalFrame
-from faao_mav.mission.command import Command, Frame
-from faao_mav.mission.item import Mission, MissionItem
+from faao_mav.mission.command import ABOVE_SEA, Command, Frame
+from faao_mav.mission.item import Home, Mission, MissionItem
 
 _TYPES: dict[tuple[str, str], VehicleType] = {}
 """The vehicle types that are known, by the names of autopilot and type."""
@@ -173,15 +173,16 @@ class Vehicle:
             self.value("fence_ceiling") if kinds & 1 else math.inf,
         )
 
-    def orbit(self, item: MissionItem) -> Orbit | None:
-        """Return how it circles at `item`, None where it does not."""
-        return self.type.orbits(self, self.type.dialect.sent(item))
+    def orbit(self, item: MissionItem, home: Home | None) -> Orbit | None:
+        """Return how it circles at `item`, None where it does not; unknown heights count as 0."""
+        ground = 0.0 if home is None or item.frame in ABOVE_SEA else home.altitude
+        density = density_ratio(sum(filter(math.isfinite, (item.z, ground))))
+        return self.type.orbits(self, self.type.dialect.sent(item), density)
 
-    @property
-    def waiting(self) -> Orbit | None:
-        """How it circles where its mission or its return ends; None for what hovers there."""
-        waits = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT)
-        return None if self.type.hovers else self.orbit(waits)
+    def waiting(self, home: Home | None, up: float) -> Orbit | None:
+        """Return how it circles where it ends `up` m above `home`; None for what hovers there."""
+        waits = MissionItem(Command.NAV_LOITER_UNLIM, Frame.GLOBAL_RELATIVE_ALT, z=up)
+        return None if self.type.hovers else self.orbit(waits, home)
 
     def returns_to(self, mission: Mission, frame: LocalFrame, here: Real, home: Real) -> Real:
         """Return where and how high a return from `here` (3,), m in `frame`, goes, (3,).

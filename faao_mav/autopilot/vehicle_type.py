@@ -3,11 +3,12 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal, NamedTuple
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot.body import Body
-from faao_mav.autopilot.dialect import Dialect
+from faao_mav.autopilot.dialect import Dialect, uint8, uint16
 from faao_mav.autopilot.manners import Failsafe, FenceAction, Manners, Modes, SetpointRules
 from faao_mav.autopilot.model import Model, Orbit
 from faao_mav.autopilot.parameter import ParameterTable, ParameterValues, Recommended
@@ -26,25 +27,28 @@ def lean_acceleration(angle: float) -> float:
     return GRAVITY * math.tan(angle)
 
 
-def orbit_at(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+def orbit_at(
+    vehicle: ParameterValues, item: MissionItem, density: float = 1.0, sided: int | None = None
+) -> Orbit | None:
     """Return how `item` is circled at, None where it is not.
 
-    The radius is the item's, param3 or of a LOITER_TO_ALT param2, and without one the vehicle's
-    `loiter_radius`; negative ones turn left.
+    The radius is the item's, param3 or of a LOITER_TO_ALT param2, over the `density`; below 1 m,
+    and of the command `sided`, it is the vehicle's `loiter_radius`. Negative ones turn left.
     """
     own = item.params[1 if item.command == Command.NAV_LOITER_TO_ALT else 2]
-    given = own if math.isfinite(own) and own != 0 else vehicle.value("loiter_radius")
-    number = item.params[0] if math.isfinite(item.params[0]) else 0.0
-    radius, clockwise = abs(given), given > 0
+    if item.command == sided or not 1 <= abs(own) < math.inf:
+        general = vehicle.value("loiter_radius")
+        own = math.copysign(general, -1 if min(general, own) < 0 else 1)
+    orbit = partial(Orbit, abs(own) / density, own > 0, tangent=item.params[3] > 0)
     match item.command:
         case Command.NAV_LOITER_TURNS:
-            return Orbit(radius, clockwise, turns=max(number, 0.0))
+            return orbit(turns=uint8(item.params[0]))
         case Command.NAV_LOITER_TIME:
-            return Orbit(radius, clockwise, seconds=max(number, 0.0))
+            return orbit(seconds=uint16(item.params[0]))
         case Command.NAV_LOITER_TO_ALT:
-            return Orbit(radius, clockwise, climbs=True)
+            return orbit(climbs=True)
         case Command.NAV_LOITER_UNLIM:
-            return Orbit(radius, clockwise, turns=1.0, endless=True)
+            return orbit(turns=1.0, endless=True)
     return None
 
 
@@ -159,8 +163,8 @@ class VehicleType:
     # Its flight model flies in wind: what hovers in more than it can hold as well
     models_wind: bool = False
     failsafes: tuple[Failsafe, ...] = ()  # What it does by itself on a loss
-    # How it circles at an item, None where it does not
-    orbits: Callable[[ParameterValues, MissionItem], Orbit | None] = lambda *_: None
+    # How it circles at an item in air of such a density over the sea's, None where it does not
+    orbits: Callable[[ParameterValues, MissionItem, float], Orbit | None] = lambda *_: None
     # Where a return goes when there are rally points
     rally: Callable[[ParameterValues], RallyRule] = lambda _: RallyRule()
 

@@ -212,7 +212,7 @@ class ValidationContext:
     def orbits(self) -> dict[int, Orbit]:
         """How the vehicle circles, by the index of the item."""
         sent = ((k, item) for k, item in self.each(*FLOWN_TO) if fits_message(item))
-        found = ((k, self.vehicle.orbit(item)) for k, item in sent)
+        found = ((k, self.vehicle.orbit(item, self.mission.home)) for k, item in sent)
         return {k: orbit for k, orbit in found if orbit is not None}
 
     @cached_property
@@ -223,11 +223,11 @@ class ValidationContext:
         """
         placed = (place for place in self.places if place.index in self.orbits)
         circles = {place.index: self.orbits[place.index].outline(place.place) for place in placed}
-        waiting, last = self.vehicle.waiting, self.legs[-1] if self.legs else None
-        if waiting is not None and last is not None:
+        for last in self.legs[-1:]:
+            waiting = self.vehicle.waiting(self.mission.home, last.end.up)
             command = self.items[last.index].command
             ends = command in LANDINGS or last.jump or last.end.index in self.orbits
-            if command == Command.NAV_RETURN_TO_LAUNCH or not ends:
+            if waiting is not None and (command == Command.NAV_RETURN_TO_LAUNCH or not ends):
                 circles[last.index] = waiting.outline(last.end.place)
         return circles
 

@@ -15,6 +15,7 @@ from random_missions import missions
 
 from faao_mav.arrays import Real
 from faao_mav.autopilot import Track, Vehicle
+from faao_mav.autopilot.body import PlaneBody
 from faao_mav.autopilot.predict import predict
 from faao_mav.errors import InputError
 from faao_mav.mission import Command, Frame, Mission, MissionItem
@@ -108,6 +109,21 @@ def test_flights_are_as_the_table_has_them() -> None:
             wanted = np.array([float(x) for x in expected.split()])
             off = np.abs(found - wanted)[np.isfinite(wanted)]
             assert (off <= float(near)).all(), (line, each, found)
+
+
+def test_circles_are_left_when_and_where_arduplane_left_them() -> None:
+    parameters, *rows = (PREDICTED.parent / "circles.tsv").read_text().splitlines()[1:]
+    for row in rows:
+        height, speed, circle, onward, *told = row.split("\t")
+        place = f"home={HOME.latitude},{HOME.longitude},{height} change_speed=0,{speed},-1"
+        way = f"takeoff:0,400,100 waypoint:0,700,100 waypoint:0,1100,100 {circle} waypoint:{onward}"
+        case, (seconds, *left) = given(f"plane {parameters} {place} {way}"), [*map(float, told)]
+        body = PlaneBody(airspeed_exponent=1)  # as the simulator has it
+        track = predict(case.mission, replace(case.vehicle, body=body))
+        assert track.reached[4] - track.reached[3] == pytest.approx(seconds, abs=3), row
+        out = track.position[track.item <= 4][-1, :2] - (400, 1100)
+        assert math.dist(out, left) < 5, row
+        assert -0.5 < math.hypot(*out) - math.hypot(*left) < 3, row  # rather wide than narrow
 
 
 def test_flights_without_a_home_or_an_end(monkeypatch: pytest.MonkeyPatch) -> None:

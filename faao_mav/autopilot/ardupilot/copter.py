@@ -172,7 +172,7 @@ _MODES = Modes(
 SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
 
 
-def _orbit(vehicle: ParameterValues, item: MissionItem) -> Orbit | None:
+def _orbit(vehicle: ParameterValues, item: MissionItem, _: float) -> Orbit | None:
     """Return how a NAV_LOITER_TURNS is flown (AC_Circle), turning by half of the acceleration.
 
     Negative radii turn left, and without one a negative CIRCLE_RATE does.

@@ -3,6 +3,7 @@
 import cmath
 import math
 from dataclasses import dataclass
+from functools import partial
 from math import pi, radians
 from typing import ClassVar
 
@@ -27,6 +28,7 @@ from faao_mav.autopilot.model import (
 from faao_mav.autopilot.parameter import parameters_of, table
 from faao_mav.autopilot.vehicle_type import orbit_at
 from faao_mav.files import numbers
+from faao_mav.mission.command import Command
 from faao_mav.power import GRAVITY
 
 FACTS = numbers("autopilot/constants.tsv", model="arduplane")
@@ -124,8 +126,8 @@ class _Flight(Flight):
     Guidance is Park, Deyst and How's (AIAA 2004-4900) in ArduPilot's form: with damping ζ and
     period T the aircraft aims at a point L = ζ T V / π ahead on its track, by the lateral
     acceleration 4 ζ² V² / L sin η, η the angle from its course to that point. It banks for that
-    as in a coordinated turn. Around a circle the track is its tangent, and η has what turns at its
-    radius, V² / R, beside; from afar it flies to the middle.
+    as in a coordinated turn. Around a circle the track is its tangent, and sin η has what turns at
+    the distance r from the middle, V² / r, beside; from afar it flies to the middle.
 
     The airspeed follows with the lag of the `body` a demand, which goes to what is commanded within
     `speed_rates`. The height is approached within the greatest climb and descent.
@@ -173,18 +175,28 @@ class _Flight(Flight):
         self.move(k, FACTS.noticed)
 
     def _circle(self, k: int, orbit: Orbit) -> None:
-        """Circle about point `k`; where that is too tight, turns of the heading count."""
+        """Circle about point `k`; where that is too tight, turns of the heading count.
+
+        Then it goes on until it heads for the next point, of one inside for the circle before it.
+        """
         end, start, turned = self.time + orbit.seconds, self._heading, 0.0
+        onward = self._places[min(k + 1, len(self._places) - 1)] - self._places[k]
         left, self._circling = -1 if orbit.clockwise else 1, True
         while (
             self.time < end
             or max(turned, left * (self._heading - start)) < 2 * pi * orbit.turns
             or (orbit.climbs and abs(self._heights[k] - self._height) > FACTS.climbed)
+            or (onward and not self._heads(onward, self._place - self._places[k], orbit.radius))
         ):
             out = self._place - self._places[k]
             self.move(k, STEP)
             turned += left * cmath.phase((self._place - self._places[k]) * out.conjugate())
-        self._circling = False
+        self._circling, self._places[k] = False, self._place if orbit.tangent else self._places[k]
+
+    def _heads(self, onward: complex, out: complex, radius: float) -> bool:
+        """Say whether it heads `onward`, seen from the place of the circle that is nearest, m."""
+        ahead = max(abs(onward), radius) * unit(onward) - radius * unit(out)
+        return abs(cmath.phase(ahead * self._velocity.conjugate())) < radians(FACTS.aligned)
 
     def _away(self, k: int, way: complex, turn: float) -> float:
         """Return how far the aircraft is from where point `k` counts as reached, m."""
@@ -208,13 +220,12 @@ class _Flight(Flight):
         orbit, ahead = self._path.orbits.get(k), self._plane.look_ahead * abs(self._velocity)
         if orbit is not None and self._circling:
             out = self._place - end
-            bend = 4 * self._plane.damping**2 * orbit.radius
-            inwards = min(max((abs(out) - orbit.radius) / ahead, -1.0), 1.0)
-            aside = math.asin(inwards) + math.asin(ahead / max(bend, ahead))
-            turn = pi / 2 + min(aside, pi / 2)  # at most straight to the middle
+            bend = 4 * self._plane.damping**2 * abs(out)
+            inwards = (abs(out) - orbit.radius) / ahead + ahead / max(bend, ahead)
+            turn = pi / 2 + math.asin(min(max(inwards, -1.0), 1.0))
             return unit(out) * cmath.rect(1.0, -turn if orbit.clockwise else turn), height
         if orbit is not None and orbit.climbs:
-            height = before
+            before = height
         if start == end or (k == 1 and self._path.entry is not None):
             return end - self._place, height
         way = unit(end - start)
@@ -269,7 +280,7 @@ ARDUPLANE = ardupilot_type(
     flight_model=ArduPlane.from_vehicle,
     ceilings={"max_acceleration": ("roll_limit",)},
     body=ARDUPLANE_BODY,
-    orbits=orbit_at,
+    orbits=partial(orbit_at, sided=Command.NAV_LOITER_TIME),
 )
 """ArduPlane 4.7. How it turns and how fast it may fly is tuned on each aircraft: no parameters are
 recommended."""

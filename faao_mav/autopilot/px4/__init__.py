@@ -204,6 +204,6 @@ PX4_PLANE = _px4_type(
     modes=replace(_MODES, guided=None),
     hovers=False,
     parameters=table(*parameters_of("px4plane")),
-    orbits=orbit_at,
+    orbits=lambda vehicle, item, _: orbit_at(vehicle, item),
 )
 """A plane with PX4 1.16: its missions can be validated, not made."""
