@@ -179,9 +179,9 @@ class MockAutopilot(Machine[None]):
         current = flight.aircraft.at(clock).item + first
         if flight.on_mission and current != self._current:
             self._current = current
-            rows, back = self.lists.items(MissionType.MISSION), flight.modes.at_fence["return"]
+            rows, back = self.lists.items(MissionType.MISSION), flight.modes.at_fence.get("return")
             returns = rows[current:] and rows[current].command == Command.NAV_RETURN_TO_LAUNCH
-            if returns and back in flight.modes.at_end:
+            if returns and back is not None and back in flight.modes.at_end:
                 flight.mode = back
             out.append(self._mission_current())
         if flight.aircraft.landed(clock):
