@@ -92,7 +92,8 @@ def main() -> None:
     chosen = set(sys.argv[1:])
     with tempfile.TemporaryDirectory() as where:
         autopilots = usable(Path(os.environ["FAAO_AUTOPILOTS"]), Path(where))
-        for folder in ("arducopter", "arduplane", "px4"):
+        own = {path.name for path in autopilots.glob("px4")}  # names are those of other flights too
+        for folder in ("arducopter", "arduplane", *(own | chosen & {"px4"})):
             files = {path.stem for path in (FLIGHTS / folder).glob("*.waypoints")}
             new = {name for name in chosen if mission_of(name) in files}
             for name in sorted({*names(folder), *new}):

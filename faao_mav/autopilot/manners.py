@@ -40,7 +40,7 @@ FenceAction: TypeAlias = Literal["nothing", "report", "hold", "return", "land", 
 class Modes:
     """Custom modes of an autopilot that flies one type of vehicle.
 
-    `rest` is one to stand on the ground in, `mission` flies the mission, `hold` stays at the place
+    `rest` is one to stand and be armed in, `mission` flies the mission, `hold` stays at the place
     (a plane circles there) without sticks, `guided` flies by setpoints (None: streams are not flown
     by that type). `at_fence` hold, return and land, as after a breach of the fence, `at_end` are
     set by a mission's last item. In those `not_to_arm_in` it does not arm, or takes off by itself.

@@ -206,9 +206,10 @@ def _state(flight: Flight, seen: Telemetry, judged: Check) -> Iterator[Finding]:
         yield _found("ground-station", who="; ".join(sorted(seen.stations)))
     if seen.strangers:
         yield _found("number-twice", where=", ".join(sorted(seen.strangers)))
+    on_mission = seen.custom_mode == seen.vehicle.modes.mission  # it is not armed in that
     if not flight.streamed and seen.row is not None and seen.row > 1:
-        yield _found("item-not-first", seen=seen)
-    if not flight.streamed and seen.custom_mode in seen.vehicle.modes.not_to_arm_in:
+        yield _found("item-not-first", Level.WARNING if on_mission else None, seen=seen)
+    if not (flight.streamed or on_mission) and seen.custom_mode in seen.vehicle.modes.not_to_arm_in:
         yield _found("mode", seen=seen)
     energy, least = judged.energy, float(LEAST_BATTERY)
     why = "where no plan tells what the flight takes"

@@ -65,11 +65,12 @@ class Watch(Machine[Ending]):
     heard; it asks for `rate` positions a second. `relay_start` is when the plan's clock read 0, s
     on the vehicle's, where that is known. After `PATIENCE` seconds without a message it ends.
 
-    With `arm` it arms the vehicle and starts the mission: once the autopilot's own checks pass, it
-    knows where it is, no other ground station was heard, what it holds has been read again and the
-    gate is clear. After `PATIENCE` seconds of checks that do not pass it ends. Nothing is ever sent
-    again, but what asks for telemetry, once the mode is one that was not asked for: then the pilot,
-    or a failsafe, has the aircraft. Without `arm` nothing else is sent at all.
+    With `arm` it arms the vehicle, in another mode than the mission's, and starts that: once the
+    autopilot's own checks pass, it knows where it is, no other ground station was heard, what it
+    holds has been read again and the gate is clear. After `PATIENCE` seconds of checks that do not
+    pass it ends. Nothing is ever sent again, but what asks for telemetry, once the mode is one that
+    was not asked for: then the pilot, or a failsafe, has the aircraft. Without `arm` nothing else
+    is sent at all.
 
     `cancel` asks a flight that was started here to hold, and again until it does or a pilot has it,
     however long the link is silent; a second time it leaves it, as any other flight. `hang_up`
@@ -77,7 +78,7 @@ class Watch(Machine[Ending]):
     it has.
 
     The phases: "waiting" for others to start it, or "checking", then those of its orders,
-    "engaging" (a `Stream` only), "arming" and "starting", or "disarming"; "flying"; "ending", when
+    "engaging" (set to a mode), "arming" and "starting", or "disarming"; "flying"; "ending", when
     the mission is over; "holding", as `cancel` asked for; "aside", when somebody else has the
     aircraft. In each the vehicle's mode is one of `_path`, which it goes along: any other was set
     by somebody else.
@@ -217,6 +218,8 @@ class Watch(Machine[Ending]):
             self._on_another_mode(mode, now)
         elif self._path:
             self._path = self._path[self._path.index(mode) :]
+        if self.phase == "engaging" and self._path == (self._modes.rest,):
+            self.phase, self.seen.current = "checking", None  # the item is to be told anew
         on_mission = self.seen.armed and mode == self._modes.mission and not self.streams
         if on_mission and self.phase in ("waiting", "starting"):
             self._begin()
@@ -294,12 +297,18 @@ class Watch(Machine[Ending]):
     def _check(self, now: float) -> None:
         """Arm, if there is nothing against it, also by what it holds now and by fresh news."""
         seen, lacks, waited = self.seen, self._lacks(now), now - self.seen.begun
-        self.outcome = self.gate.refusal()
+        self.outcome, modes = self.gate.refusal(), self._modes
         if waited >= PATIENCE:
             said = "; ".join(dict.fromkeys(seen.said)) or lacks or "it does not say why"
             self._end("refused", f"its own checks do not pass in {waited:.0f} s: {said}")
+        if self.outcome is not None or waited < _LISTEN or lacks:
+            return
+        if seen.custom_mode == modes.mission and self.gate.is_clear:
+            seen.told.append(f"mode {seen.mode}: it is armed in another, which is set first")
+            self.phase, self._path = "engaging", (modes.mission, modes.rest)
+            self._give(self._to_set(modes.rest), now)
         may_arm = seen.status is not None and seen.status.may_arm and seen.current is not None
-        if self.outcome is not None or waited < _LISTEN or lacks or not may_arm:
+        if seen.custom_mode == modes.mission or not may_arm:
             return
         asks = self.gate.read_again(now)
         self._out += asks or ()

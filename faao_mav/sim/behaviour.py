@@ -32,7 +32,7 @@ class Behaviour:
     requested_mode: Callable[[int, int], int | None]
     no_mode: int  # The MAV_RESULT for no such mode
     denied: int  # That of a mode that it does not enter, and with which it does not arm
-    rewinds: frozenset[str] = frozenset()  # Those whose mission begins anew once they are disarmed
+    rewinds: bool = False  # Its mission begins anew once it is disarmed
     # What ground stations look for beside the parameters that the package knows
     parameters: Mapping[str, float] = field(default_factory=dict)
     numbers_missions: bool = False  # It tells a number for each mission
@@ -95,7 +95,7 @@ _BEHAVIOURS: dict[MockKind, Behaviour] = {
         requested_mode=lambda mode, _: mode if mode >= 0 else None,
         no_mode=2,  # denied
         denied=4,  # failed
-        rewinds=frozenset({"copter"}),  # AP_Arming_Copter::disarm; a plane in AUTO does not
+        rewinds=True,
         parameters={"SYSID_THISMAV": 1, "FRAME_CLASS": 1, "BATT_MONITOR": 4},
         tells_no_place=True,
         armed_inside_only=True,

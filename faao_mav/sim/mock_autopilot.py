@@ -302,15 +302,18 @@ class MockAutopilot(Machine[None]):
         return self._begin() if self.mode == self.flight.modes.mission else _ACCEPTED
 
     def _rewind(self) -> None:
-        """Go back to the first item, disarmed, as some types do."""
-        if self.vehicle.kind in self.behaviour.rewinds:
+        """Go back to the first item, disarmed; planes do in another mode than the mission's."""
+        away = self.vehicle.hovers or self.mode != self.flight.modes.mission
+        if self.behaviour.rewinds and away and not self.armed:
             self._current = 0
 
     def _why_not_armed(self) -> str:
         """Return what it says when it does not arm, "" if it does."""
         if not self._is_ready():
             return "Calibrating"
-        if self.mode in self.flight.modes.not_to_arm_in:
+        modes, options = self.flight.modes, self.parameters.values.get("AUTO_OPTIONS", 0)
+        arms = self.mode == modes.mission and options % 2 >= 1
+        if self.mode in modes.not_to_arm_in and not arms:
             return "Mode not armable"
         with suppress(InputError):  # peers store what they like
             fence = self.mission().fence
@@ -325,6 +328,7 @@ class MockAutopilot(Machine[None]):
         if mode == modes.guided and not self.flight.accepts_guided(clock):
             return self.behaviour.denied
         self.flight.enter(mode, clock)
+        self._rewind()
         return self._begin() if mode == modes.mission else _ACCEPTED
 
     def _flyable(self) -> Mission | None:

@@ -118,6 +118,7 @@ ORDERS: dict[str, tuple[int, float]] = {
     "arm": (MavCommand.ARM, 1.0),
     "disarm": (MavCommand.ARM, 0.0),
     "start": (MavCommand.START, 0.0),
+    "mode": (MavCommand.SET_MODE, 1.0),
 }
 
 Picks: TypeAlias = Callable[[Message], bool]
@@ -152,6 +153,7 @@ PICKED: dict[str, Picks] = {
     "arm": lambda message: arms(message, 1.0),
     "disarm": lambda message: arms(message, 0.0),
     "start": starts,
+    "mode": lambda message: getattr(message, "command", None) == MavCommand.SET_MODE,
     "setpoints": is_setpoint,
     "lists": lambda message: isinstance(message, messages.MissionRequestList),
     "hold": lambda message: (

@@ -108,12 +108,21 @@ def height(desk: Desk, seconds: float) -> float:
 
 
 def test_a_plane_has_its_own_number_and_modes() -> None:
-    desk = desk_for("ardupilot", a_mission(5), aircraft="plane", speedup=20.0)
+    desk = desk_for("ardupilot", a_mission(30), aircraft="plane", speedup=20.0)
     assert (result(desk, ARM), result(desk, AUTO["ardupilot"])) == (0, 0)  # training, for a plane
     assert height(desk, 2.0) == 0
     assert result(desk, 10) == 0
     assert height(desk, 2.0) > 0
+    for mode, begins_anew in ((10, False), (2, True)):  # disarmed in AUTO it keeps its item
+        assert (result(desk, DISARM), result(desk, mode)) == (0, 0)
+        assert (only(desk.wait(1.5), messages.MissionCurrent)[-1].seq == 0) == begins_anew
     assert only(desk.wait(1.5), messages.Heartbeat)[-1].type == 1
+
+
+@pytest.mark.parametrize(("options", "answer"), [(0, 4), (2, 4), (3, 0)])
+def test_a_copter_arms_in_auto_as_its_parameter_allows(options: int, answer: int) -> None:
+    desk = desk_for("ardupilot", a_mission(5), parameters={"AUTO_OPTIONS": options})
+    assert (result(desk, AUTO["ardupilot"]), result(desk, ARM)) == (0, answer)
 
 
 @BOTH
@@ -139,7 +148,7 @@ def test_it_flies_what_it_holds_once_it_is_armed_and_told_to(kind: MockKind) -> 
     said = only(desk.wait(300.0), Statustext)
     assert "Landed, disarming" in [text.text for text in said]
     assert desk.machine.flight.aircraft.at(desk.now).position == pytest.approx([0, 0, 0])
-    assert (result(desk, auto), result(desk, ARM)) == (0, 0)
+    assert (result(desk, 0), result(desk, ARM), result(desk, START)) == (0, 0, 0)
     assert height(desk, 3.0) > 0
     (kept,) = desk.tell(messages.MissionClearAll(VEHICLE, 0))  # ArduPilot keeps what it flies
     assert kept.type == (MavResult.ERROR if kind == "ardupilot" else MavResult.ACCEPTED)

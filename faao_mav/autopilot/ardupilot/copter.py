@@ -166,10 +166,10 @@ _MODES = Modes(
     hold=_BRAKE,
     at_fence={"return": 6, "land": 9, "hold": _BRAKE},
     guided=4,
-    not_to_arm_in=frozenset({6, 7, 9, 14, 15, _BRAKE, 18, 21, 27}),
+    not_to_arm_in=frozenset({3, 6, 7, 9, 14, 15, _BRAKE, 18, 21, 27}),
 )
-"""COPTER_MODE of MAVLink. ArduCopter 4.7 does not arm in RTL, CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE,
-SMART_RTL and AUTO_RTL (in AUTO as AUTO_OPTIONS says), and takes off when thrown in THROW."""
+"""COPTER_MODE of MAVLink. ArduCopter 4.7 does not arm in AUTO (unless AUTO_OPTIONS is odd), RTL,
+CIRCLE, LAND, FLIP, AUTOTUNE, BRAKE, SMART_RTL and AUTO_RTL, and takes off when thrown in THROW."""
 
 
 def _orbit(vehicle: ParameterValues, item: MissionItem, _: float) -> Orbit | None:
