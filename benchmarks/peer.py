@@ -312,9 +312,7 @@ class Model:
         w, v = (part.reshape(n, 2) for part in np.split(x[: 4 * n], 2))
         a = x[4 * n : 6 * n - 2].reshape(n - 1, 2)
         return Trajectory(
-            w * LENGTH,
-            v * kin.max_speed,
-            np.vstack([a * kin.max_acceleration, np.zeros(2)]),
+            w * LENGTH, v * kin.max_speed, np.vstack([a * kin.max_acceleration, np.zeros(2)])
         )
 
 

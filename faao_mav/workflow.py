@@ -300,11 +300,7 @@ def optimize_plan(
 
 
 def plan_mission(
-    plan: Plan,
-    *,
-    bound: bool = False,
-    observe: Observer | None = None,
-    **parts: Unpack[OwnParts],
+    plan: Plan, *, bound: bool = False, observe: Observer | None = None, **parts: Unpack[OwnParts]
 ) -> Result:
     """Optimise the flight of `plan` and make the mission that flies it.
 

@@ -156,12 +156,7 @@ def _free_instance() -> int:
 
 
 @contextmanager
-def _px4(
-    autopilots: Path,
-    kind: str,
-    where: Path,
-    options: Sequence[str],
-) -> Iterator[Running]:
+def _px4(autopilots: Path, kind: str, where: Path, options: Sequence[str]) -> Iterator[Running]:
     port, runner = free_port(), str(autopilots / "fly_px4.py")
     command = [sys.executable, runner, "--serve", f"--home={HOME}", "--gcs-port", str(port)]
     for _ in range(PX4_STARTS):

@@ -41,9 +41,7 @@ def required() -> set[str]:
     return found
 
 
-def test_a_plan_needs_no_extra_and_one_that_is_missing_is_named_in_one_line(
-    tmp_path: Path,
-) -> None:
+def test_a_plan_needs_no_extra_and_one_that_is_missing_is_named_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "plan.yaml").write_text(FLYABLE)
     (tmp_path / "flight.ulg").write_bytes(b"ULog")
     (tmp_path / "dem.tif").write_bytes(b"II*")

@@ -8,13 +8,7 @@ from pathlib import Path
 import pytest
 
 from faao_mav.errors import InputError, PlanError
-from faao_mav.files import (
-    check_apart,
-    check_writable,
-    read_text,
-    write_together,
-    write_whole,
-)
+from faao_mav.files import check_apart, check_writable, read_text, write_together, write_whole
 
 
 def test_content_arrives_and_replaces(tmp_path: Path) -> None:

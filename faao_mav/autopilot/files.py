@@ -4,11 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from faao_mav.autopilot.vehicle import (
-    Vehicle,
-    families,
-    kind_by_number,
-)
+from faao_mav.autopilot.vehicle import Vehicle, families, kind_by_number
 from faao_mav.autopilot.vehicle_type import VehicleType
 from faao_mav.mission.formats import MissionFile, PlanTarget
 

@@ -22,12 +22,7 @@ from faao_mav.arrays import Complex, Real
 from faao_mav.errors import InfeasibleError
 from faao_mav.optimizer.design import Design, Link, design
 from faao_mav.optimizer.interior.constraint import ALLOWED, every_excess
-from faao_mav.optimizer.interior.maximize import (
-    LocalOptimum,
-    feasible,
-    nearest_flight,
-    objective,
-)
+from faao_mav.optimizer.interior.maximize import LocalOptimum, feasible, nearest_flight, objective
 from faao_mav.optimizer.kinematics import Trajectory
 from faao_mav.optimizer.problem import Problem, build_problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
@@ -248,10 +243,7 @@ class _Search:
         return problem.improved(field, start, tolerance, steps, warm=warm)
 
     def best(
-        self,
-        values: Mapping[str, float],
-        flights: Mapping[str, Trajectory],
-        within: float = _EQUAL,
+        self, values: Mapping[str, float], flights: Mapping[str, Trajectory], within: float = _EQUAL
     ) -> str:
         """Return which of the `flights` with values `within` the best one's delivers most.
 

@@ -64,10 +64,7 @@ def optimize(plan: Plan, *, observe: Observer | None = None, **parts: Unpack[Own
 
 
 def _solved(
-    plan: Plan,
-    observe: Observer | None,
-    known: Trajectory | None,
-    **parts: Unpack[OwnParts],
+    plan: Plan, observe: Observer | None, known: Trajectory | None, **parts: Unpack[OwnParts]
 ) -> Solution:
     """Return the solution of `plan`, of one height; of plans without a goal from `known` too."""
     if plan.goal.minimise or plan.goal.maximise == "data":

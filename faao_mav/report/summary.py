@@ -35,12 +35,7 @@ def joined(lines: Iterable[Line]) -> str:
     return "\n".join(f"{label:<{_LABEL_WIDTH}}{text}" for label, text in lines)
 
 
-def summary(
-    result: Result,
-    written: Sequence[Path] = (),
-    *,
-    verbose: bool = False,
-) -> str:
+def summary(result: Result, written: Sequence[Path] = (), *, verbose: bool = False) -> str:
     """Return the text that the main job prints: `result`, and the files that were `written`.
 
     The first line is for who flies: what arrives, in how long, whether the mission keeps it and

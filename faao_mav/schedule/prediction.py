@@ -127,10 +127,7 @@ def deviation(planned_t: Real, planned_w: Real, t: Real, w: Real, tolerance: flo
         rms=float(np.sqrt(np.mean(apart**2))),
         max=float(apart.max()),
         path=float(
-            max(
-                distances_to_path(path, planned_w).max(),
-                distances_to_path(planned_w, path).max(),
-            )
+            max(distances_to_path(path, planned_w).max(), distances_to_path(planned_w, path).max())
         ),
         late=late,
     )

@@ -261,9 +261,7 @@ def test_the_route_goes_round_a_zone_that_is_drawn(window: "Page", served: Serve
     assert window.locator(".leaflet-pane path.zone-out").count() == 0
 
 
-def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(
-    window: "Page",
-) -> None:
+def test_a_bad_value_is_told_at_its_field_in_the_words_of_the_command_line(window: "Page") -> None:
     window.get_by_role("tab", name="Result").click()
     window.locator(".facts dt").first.wait_for()
     window.get_by_role("tab", name="Plan").click()

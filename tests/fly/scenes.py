@@ -13,16 +13,7 @@ from typing import Any, TypeAlias, cast
 import numpy as np
 from conftest import FLYABLE, changes_in, edited
 from simulate import Station, simulate
-from stations import (
-    FOREIGN,
-    HOME,
-    RALLY,
-    VEHICLE,
-    a_mission,
-    peer_of,
-    rows_for,
-    vehicle_of,
-)
+from stations import FOREIGN, HOME, RALLY, VEHICLE, a_mission, peer_of, rows_for, vehicle_of
 
 from faao_mav import optimize, parse_plan
 from faao_mav.autopilot import Track, Vehicle

@@ -81,8 +81,7 @@ QUICK = {
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["a gap 15 m wide", "inclusion with a bay", "zones that touch", "forty random polygons"],
+    "name", ["a gap 15 m wide", "inclusion with a bay", "zones that touch", "forty random polygons"]
 )
 def test_the_whole_path_keeps_the_margin(name: str) -> None:
     few = {"optimizer.max_iterations": 2} if name.startswith("forty") else {}

@@ -113,9 +113,7 @@ def test_a_goal_out_of_reach_says_what_is_possible() -> None:
 
 
 @given(
-    st.lists(st.integers(0, 1000), min_size=2, max_size=300),
-    st.integers(0, 400),
-    st.floats(0, 1),
+    st.lists(st.integers(0, 1000), min_size=2, max_size=300), st.integers(0, 400), st.floats(0, 1)
 )
 def test_the_least_number_is_that_of_trying_all(steps: list[int], none: int, share: float) -> None:
     values = np.cumsum(steps)

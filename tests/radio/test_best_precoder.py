@@ -32,8 +32,7 @@ def best(
 
 
 @pytest.mark.parametrize(
-    ("measure", "modulation", "draws"),
-    [("cutoff", "8psk", 2), ("mutual_information", "qpsk", 1)],
+    ("measure", "modulation", "draws"), [("cutoff", "8psk", 2), ("mutual_information", "qpsk", 1)]
 )
 def test_no_other_precoder_near_it_is_better(measure: Measure, modulation: str, draws: int) -> None:
     H = channel(3, 2, draws, 2, 2)

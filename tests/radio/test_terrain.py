@@ -10,12 +10,7 @@ from scipy.special import fresnel
 from faao_mav.arrays import Real
 from faao_mav.errors import InputError
 from faao_mav.radio.map_file import read_raster
-from faao_mav.radio.terrain import (
-    diffraction_loss,
-    knife_edge_loss,
-    read_terrain,
-    terrain_map,
-)
+from faao_mav.radio.terrain import diffraction_loss, knife_edge_loss, read_terrain, terrain_map
 
 SHARE: Real = np.linspace(0.0, 1.0, 2001)[1:-1, None]
 EARTH = 8.5e6

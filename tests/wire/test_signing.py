@@ -64,9 +64,7 @@ def test_signed_packets_need_the_key() -> None:
 
 @settings(max_examples=20)
 @given(st.lists(st.tuples(st.integers(-9, 9), st.integers(0, 255)), max_size=20))
-def test_a_packet_is_taken_that_is_younger_than_all_before(
-    stream: list[tuple[int, int]],
-) -> None:
+def test_a_packet_is_taken_that_is_younger_than_all_before(stream: list[tuple[int, int]]) -> None:
     """Whatever number its sender gives the link, and whatever forged ones say."""
     receiver, youngest = signing(), -math.inf
     assert receiver.judge(signed(NOW + 1e6, signing_key("wrong")), VEHICLE) == "forged"

@@ -66,10 +66,7 @@ ARDUPILOT = AutopilotFamily(
     parameter_style="list",
     parameter_prefixes=("WPNAV_", "WP_", "ATC_", "PSC_", "ARMING_"),
     manners=Manners(
-        request_period=1.0,
-        patience=8.0,
-        any_request_order=True,
-        meanings=meanings_of("ardupilot"),
+        request_period=1.0, patience=8.0, any_request_order=True, meanings=meanings_of("ardupilot")
     ),
     setpoints=SetpointRules(
         "GUID_TIMEOUT",

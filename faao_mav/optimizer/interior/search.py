@@ -13,12 +13,7 @@ import numpy as np
 
 from faao_mav.arrays import Real
 from faao_mav.optimizer.interior.constraint import TINY, Constraint, Grid, V
-from faao_mav.optimizer.interior.newton import (
-    Direction,
-    Iterate,
-    System,
-    newton_direction,
-)
+from faao_mav.optimizer.interior.newton import Direction, Iterate, System, newton_direction
 from faao_mav.optimizer.interior.rewards import Goal
 from faao_mav.optimizer.kinematics import Kinematics
 
@@ -194,10 +189,7 @@ class Search:
     def _centre(self) -> None:
         """Give the iterate multipliers from a larger mu: that leads away from limits."""
         it = self.iterate
-        self.mu = min(
-            COLD * self.steepness,
-            _CENTRING * float(it.s @ it.z) / len(it.s),
-        )
+        self.mu = min(COLD * self.steepness, _CENTRING * float(it.s @ it.z) / len(it.s))
         self.iterate = replace(it, z=self.mu / it.s)
         self.proximal, self.attempts, self.short = 0.0, 0, 0
         self.centrings += 1

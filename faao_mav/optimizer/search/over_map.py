@@ -214,12 +214,7 @@ def queue_sweep(problem: Problem, field: RateField, cells: int, room: float = 0.
 
 
 def improved_over_map(
-    problem: Problem,
-    field: RateField,
-    start: Trajectory,
-    iterations: int,
-    *,
-    rough: bool = False,
+    problem: Problem, field: RateField, start: Trajectory, iterations: int, *, rough: bool = False
 ) -> LocalOptimum:
     """Return the best of `start` and of what searches in tubes about it end in, by `field`.
 
