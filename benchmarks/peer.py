@@ -98,7 +98,7 @@ def peer_starts(problem: Problem, random: int) -> dict[str, Trajectory]:
     rng, kin = np.random.default_rng(0), problem.kinematics
     corners = np.stack([*places.values(), kin.start, kin.end])
     low, high = corners.min(axis=0) - 50, corners.max(axis=0) + 50
-    for k in range(random if len(named) > 1 else 0):
+    for k in range(random if named != ("straight",) else 0):
         places |= {f"a{k}": rng.uniform(low, high), f"b{k}": rng.uniform(low, high)}
         names.append(f"a{k}-b{k}")
     found = starts(kin, names, places)

@@ -11,7 +11,7 @@ Measured (benchmarks/direct_against_ipopt.py): never below CasADi + IPOPT from t
 starts, and several times quicker.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
@@ -28,7 +28,14 @@ from faao_mav.optimizer.problem import Problem, build_problem, counted_as_cutoff
 from faao_mav.optimizer.rates import RateModel, link_coordinates
 from faao_mav.optimizer.rates.field import RateField, rate_field
 from faao_mav.optimizer.search.over_map import improved_over_map, starts_over_map
-from faao_mav.optimizer.search.starts import ROUGH, improve_starts, paced, sparing_starts, starts
+from faao_mav.optimizer.search.starts import (
+    BY_STATIONS,
+    ROUGH,
+    improve_starts,
+    paced,
+    sparing_starts,
+    starts,
+)
 from faao_mav.optimizer.shadowing import SHADES, shaded, under_shadowing
 from faao_mav.optimizer.solution import Observer, Progress, Solution, make_solution
 from faao_mav.plan import Plan
@@ -197,7 +204,10 @@ class _Search:
         fenced, routes = problem.fenced(kin), dict[str, Trajectory]()
         stations = {"bs": problem.bs_uav.gains.midway, "user": problem.uav_user.gains.midway}
         one = alone or self.rough or problem.mapped
-        names = ("straight",) if one else problem.plan.optimizer.starts
+        names: Sequence[str] = ("straight",) if one else problem.plan.optimizer.starts
+        if "global" in names:
+            few = kin.min_speed == 0 and problem.plan.radio.causal
+            names = [name for name in BY_STATIONS if not few or name not in stations]
         again = None if known is None else self._in_time(known)
         if alone and again is not None:
             near = kin.follow(again)

@@ -141,7 +141,7 @@ class Optimizer:
     starts: Annotated[
         tuple[Literal["straight", "global", "bs", "user", "bs-user", "user-bs"], ...],
         Field(min_length=1),
-    ] = ("straight", "bs", "user", "bs-user", "user-bs")
+    ] = ("global",)
     tolerance: Number = 1e-4
     max_iterations: Whole = 50
 
