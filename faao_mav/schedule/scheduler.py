@@ -50,7 +50,7 @@ _SPEED_SHARE = 0.85  # of the plan's speed at a split, for which both parts must
 _MOVE_SHARE = 0.5
 _MOVES = 12  # times that the waypoints are moved; twice as many bring a tenth at most
 _ROUNDS = 3  # times that waypoints are moved and speeds fitted, in turn; chosen
-_AHEAD = 2.0  # how long before the plan's speed changes the command does, s; measured on 26 plans
+_AHEAD = 2.0  # how long before the plan's speed changes the command may, s; measured on 26 plans
 # Where the plan's speed changes by more than this share, its legs are split so often, s; chosen.
 _CHANGE, _CHANGE_SPACING = 0.05, 5.0
 
@@ -257,17 +257,16 @@ class PlaneScheduler(Scheduler):
     """As `Scheduler`, for an aircraft that neither waits nor turns on the spot."""
 
     def first(self, route: Route) -> Schedule:
-        """Return `route` with the waypoints that keep the path best.
+        """Return `route` with the waypoints that keep the path best, `_AHEAD` of the speeds."""
+        return self._kept(self._at_speeds(self.with_waypoints(route, self._changes(route)), _AHEAD))
 
-        Its speeds are the plan's airspeeds `_AHEAD` s after the middle of each leg, as commanded.
-        """
+    def _at_speeds(self, route: Route, ahead: float) -> Route:
+        """Return `route` with the plan's airspeeds `ahead` s after the middle of each leg."""
         ratio = self.model.true_over_commanded(self.altitude)
-        route = self.with_waypoints(route, self._changes(route))
         duration, times = np.diff(self.t), (route.arrivals[1:] + route.arrivals[:-1]) / 2
         airspeed = lengths(np.diff(self.w, axis=0) / duration[:, None] - self.wind)
-        planned = np.interp(times + _AHEAD, self.t[1:] - duration / 2, airspeed)
-        speeds = np.clip(planned / ratio, self.min_speed, self.max_speed)
-        return self._kept(replace(route, speeds=speeds))
+        planned = np.interp(times + ahead, self.t[1:] - duration / 2, airspeed)
+        return replace(route, speeds=np.clip(planned / ratio, self.min_speed, self.max_speed))
 
     def _kept(self, route: Route) -> Schedule:
         """Return the flight of `route` with its waypoints moved to keep the path best."""
@@ -314,11 +313,16 @@ class PlaneScheduler(Scheduler):
         return np.array(times)
 
     def refined(self, first: Schedule) -> Schedule:
-        """Return `first` with the speeds that fit best, few and as they are sent."""
-        tried = [first]
-        for _ in range(_ROUNDS):
-            kept = self._kept(tried[-1].route).route
-            if len(tried) > 1 and np.array_equal(kept.positions, tried[-1].route.positions):
-                break  # the waypoints are where they were, and so would be the speeds
-            tried.append(self.fitted(kept))
+        """Return `first` with the speeds that fit best, few and as they are sent.
+
+        The fit begins once `_AHEAD` of the plan's speeds, and once with these.
+        """
+        tried = list[Schedule]()
+        for begun in (first, self._kept(self._at_speeds(first.route, 0.0))):
+            tried.append(begun)
+            for n in range(_ROUNDS):
+                kept = self._kept(tried[-1].route).route
+                if n > 0 and np.array_equal(kept.positions, tried[-1].route.positions):
+                    break  # the waypoints are where they were, and so would be the speeds
+                tried.append(self.fitted(kept))
         return self.sent(min(tried, key=lambda each: each.cost))
