@@ -214,7 +214,9 @@ class Watch(Machine[Ending]):
             self._over()
 
     def _on_mode(self, mode: int, now: float) -> None:
-        if self._path and mode not in self._path:
+        if self.phase == "engaging" and self.seen.armed:
+            self._step_aside()
+        elif self._path and mode not in self._path:
             self._on_another_mode(mode, now)
         elif self._path:
             self._path = self._path[self._path.index(mode) :]
@@ -357,8 +359,8 @@ class Watch(Machine[Ending]):
         self._repeat(now)
 
     def _repeat(self, now: float) -> None:
-        order = self._order
-        if order is None or now < order.due:
+        order, unseen = self._order, self.phase == "engaging" and not self.seen.is_fresh(now)
+        if order is None or now < order.due or unseen:
             return
         if order.sent == _TRIES and self.phase == "holding":
             text = f"it does not confirm that it holds, it {order.answer}: it is asked again"
