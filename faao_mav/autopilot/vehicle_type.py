@@ -42,7 +42,7 @@ def orbit_at(
     orbit = partial(Orbit, abs(own) / density, own > 0, tangent=item.params[3] > 0)
     match item.command:
         case Command.NAV_LOITER_TURNS:
-            return orbit(turns=uint8(item.params[0]))
+            return orbit(turns=uint8(item.params[0]) or max(0.0, item.params[0]))
         case Command.NAV_LOITER_TIME:
             return orbit(seconds=uint16(item.params[0]))
         case Command.NAV_LOITER_TO_ALT:

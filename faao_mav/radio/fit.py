@@ -80,10 +80,13 @@ class Samples:
         """Return means over `seconds` of time, of the power and of the place, in flight.
 
         That is against fast fading. In flight is underway, or above half the median height; what is
-        not finite is left out. Where a clock begins anew, as in the next flight, so does a mean.
+        not finite is left out. Where a clock begins anew, as in the next flight, so does a mean;
+        rows of which more than 1 % step back in time are put in its order.
         """
         rows = np.column_stack([self.t, self.place, self.level])
         rows = rows[np.isfinite(rows).all(axis=1) & (self.place[:, 2] > 0.0)]
+        if np.sum(np.diff(rows[:, 0]) < 0) > 0.01 * len(rows):
+            rows = rows[np.argsort(rows[:, 0], kind="stable")]
         rows[:, 4] = 10.0 ** (rows[:, 4] / 10.0)
         group = np.cumsum(np.diff(np.floor(rows[:, 0] / seconds), prepend=-math.inf) != 0) - 1
         rows = np.stack([np.bincount(group, x) / np.bincount(group) for x in rows.T], axis=1)

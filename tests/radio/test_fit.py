@@ -115,6 +115,9 @@ def test_a_low_leg_is_flown_too_and_a_clock_may_begin_anew() -> None:
     found = Samples(t, np.stack(place, axis=1), level).means(2.0)
     apart = np.concatenate([each.means(2.0).place for each in parts])
     np.testing.assert_allclose(found.place, apart[1:])  # the first is not known to be underway
+    order = np.argsort(parts[1].level)
+    mixed = Samples(parts[1].t[order], parts[1].place[order], parts[1].level[order])
+    np.testing.assert_allclose(mixed.means(2.0).place, parts[1].means(2.0).place)
 
 
 def test_one_leg_gives_the_level_alone() -> None:
