@@ -257,8 +257,8 @@ class PlaneScheduler(Scheduler):
     """As `Scheduler`, for an aircraft that neither waits nor turns on the spot."""
 
     def first(self, route: Route) -> Schedule:
-        """Return `route` with the waypoints that keep the path best, `_AHEAD` of the speeds."""
-        return self._kept(self._at_speeds(self.with_waypoints(route, self._changes(route)), _AHEAD))
+        """Return `route` with waypoints where the speed changes, at the plan's airspeeds."""
+        return self.flight(self._at_speeds(self.with_waypoints(route, self._changes(route)), 0.0))
 
     def _at_speeds(self, route: Route, ahead: float) -> Route:
         """Return `route` with the plan's airspeeds `ahead` s after the middle of each leg."""
@@ -315,11 +315,11 @@ class PlaneScheduler(Scheduler):
     def refined(self, first: Schedule) -> Schedule:
         """Return `first` with the speeds that fit best, few and as they are sent.
 
-        The fit begins once `_AHEAD` of the plan's speeds, and once with these.
+        The fit begins once with the plan's speeds, and once `_AHEAD` of them.
         """
         tried = list[Schedule]()
-        for begun in (first, self._kept(self._at_speeds(first.route, 0.0))):
-            tried.append(begun)
+        for ahead in (0.0, _AHEAD):
+            tried.append(self._kept(self._at_speeds(first.route, ahead)))
             for n in range(_ROUNDS):
                 kept = self._kept(tried[-1].route).route
                 if n > 0 and np.array_equal(kept.positions, tried[-1].route.positions):
