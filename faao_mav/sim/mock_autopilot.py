@@ -322,13 +322,14 @@ class MockAutopilot(Machine[None]):
         return ""
 
     def _set_mode(self, mode: int) -> int:
-        modes, clock = self.flight.modes, self._clock
+        modes, clock, before = self.flight.modes, self._clock, self.mode
         if mode == modes.mission and self._flyable() is None:
             return self.behaviour.denied
         if mode == modes.guided and not self.flight.accepts_guided(clock):
             return self.behaviour.denied
         self.flight.enter(mode, clock)
-        self._rewind()
+        if before == modes.mission:
+            self._rewind()
         return self._begin() if mode == modes.mission else _ACCEPTED
 
     def _flyable(self) -> Mission | None:

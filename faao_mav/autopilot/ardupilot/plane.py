@@ -262,9 +262,9 @@ class _Flight(Flight):
         self.keep(self._place, self._height, self._velocity, self._climb)
 
 
-_LOITER, _RTL = 12, 11
-# PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL.
-_MODES = Modes(2, 10, _LOITER, {"return": _RTL}, frozenset({_RTL}), None, frozenset({_RTL}))
+_LOITER, _RTL = 12, frozenset({11})
+# PLANE_MODE of MAVLink; ArduPlane 4.7 does not arm in RTL, to which a mission's return changes.
+_MODES = Modes(2, 10, _LOITER, {"return": 11}, at_end=_RTL, not_to_arm_in=_RTL)
 
 ARDUPLANE = ardupilot_type(
     kind="plane",
